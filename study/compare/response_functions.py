@@ -66,8 +66,8 @@ def response_functions(prediction: Prediction) -> ResponseFunctions:
 
 
 def drive_of(prepared: Prepared) -> str:
-    """The channel that a response answers to: the force, or where motion is prescribed the displacement."""
-    return "displacement" if prepared.response == FORCE else FORCE
+    """The channel that a response answers to: the force, the first of several, or a prescribed displacement."""
+    return "displacement" if prepared.response == FORCE else prepared.record.forces[0]
 
 
 def _h1(matrix: SpectralMatrix) -> tuple[Complexes, Floats]:

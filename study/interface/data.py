@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from study.interface.equation import Model
     from study.records.readers import ReadOptions
 
 
@@ -95,7 +96,7 @@ class Record(records.Record):
         StudyError
             If there is no such channel.
         """
-        name = self._known(channel or next(m for m in records.MOTIONS if m in self))
+        name = self._known(channel or str(self.sensors[0]))
         with drawing_axes(ax) as (axes,):
             axes.plot(self.time, self[name], linewidth=0.8)
             axes.set(xlabel="time (s)", ylabel=f"{name} ({self.units.get(name, '')})", title=self.name)
@@ -139,6 +140,7 @@ def read(
     accept_saturated: bool = False,
     accept_swapped: bool = False,
     free: bool = False,
+    model: "Model | None" = None,
 ) -> Record:
     """Read a measured record: CSV and other text tables, MATLAB to 7.3, HDF5, UFF (dataset 58), or Parquet.
 
@@ -163,6 +165,9 @@ def read(
         Take a channel that rests at its extreme, or force and response that seem exchanged, for what they are.
     free : bool
         A free decay: no force acts, and a column of it is left out.
+    model : Model, optional
+        The structure that was measured, whose forces and coordinates the columns are named by: ``shaker``, ``floor1
+        acceleration``. A single mass if left out.
 
     Returns
     -------
@@ -179,7 +184,10 @@ def read(
         dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped,
         free=free,
     )  # fmt: skip
-    return Record.of(read_record(Path(path), options), Path(path))
+    found = (
+        read_record(Path(path), options) if model is None else read_record(Path(path), options, model.equation.roles)
+    )
+    return Record.of(found, Path(path))
 
 
 def record(
@@ -194,6 +202,7 @@ def record(
     accept_saturated: bool = False,
     accept_swapped: bool = False,
     free: bool = False,
+    model: "Model | None" = None,
 ) -> Record:
     """Make a record of arrays or of a table, with the checks that a file has to pass.
 
@@ -201,7 +210,7 @@ def record(
     ----------
     channels : mapping of arrays of shape (n,), or DataFrame
         Named as :func:`read` would find them in a file (``force``, ``displacement``, ...), or as ``columns`` says.
-    columns, units, fs, dt, period, accept_saturated, accept_swapped, free
+    columns, units, fs, dt, period, accept_saturated, accept_swapped, free, model
         As for :func:`read`.
     name : str
         What it is called in tables.
@@ -216,15 +225,16 @@ def record(
     options = ReadOptions(
         dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped, free=free
     )
-    return Record.of(_from_arrays({str(key): values for key, values in channels.items()}, name, options))
+    arrays = {str(key): values for key, values in channels.items()}
+    return Record.of(_from_arrays(arrays, name, options, model))
 
 
-def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -> records.Record:
+def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions", model: "Model | None") -> records.Record:
     from study.records.readers import Roles, not_swapped
     from study.records.readers.assemble import record_from
     from study.records.readers.table import Column, Table, split_unit
 
-    columns: list[Column] = []
+    columns, roles = list[Column](), Roles() if model is None else model.equation.roles
     for heading, values in arrays.items():
         array = np.asarray(values)
         if array.ndim != 1 or array.dtype.kind not in "biuf":
@@ -233,4 +243,4 @@ def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -
             )
         title, unit = split_unit(heading)
         columns.append(Column(title, array.astype(np.float64), unit))
-    return not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, Roles()), options)
+    return not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, roles), options)

@@ -1,13 +1,14 @@
 """Models: equations of motion made of terms."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 from study.equations import model as equations
 from study.equations import model_file, terms
 from study.equations.model import ModelTerm
+from study.equations.place import HERE, Kind, Place
 from study.equations.redundancy import repeated_force
 from study.interface.data import Record
 from study.interface.showing import html_table
@@ -23,7 +24,10 @@ Samples = tuple[int, int | None]  # the first, and the one after the last
 Times = tuple[float, float | None]  # seconds
 
 
-def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
+def term(
+    name: str, *, force: str | None = None, at: str | None = None, between: Sequence[str] | None = None,
+    couples: Sequence[str] | None = None, **values: float,
+) -> "Term":  # fmt: skip
     """A term with values that a fit holds.
 
     Parameters
@@ -32,6 +36,9 @@ def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
         An effect of the library (:func:`library`), or a name of your own with ``force``.
     force : str, optional
         Formula of your own effect, such as ``"u*abs(u)"``: of u, v, t and further channels. Parsed, never evaluated.
+    at, between, couples : str or pair of str, optional
+        Of a structure: the coordinate on which it acts, the two between which it does (``ground`` may be one of them),
+        or the two that an inertia couples.
     **values : float
         ``value`` of its coefficient (``amplitude`` and ``phase`` of a periodic one) and shape parameters by name, in
         the units of the record. What is left out is fitted.
@@ -47,7 +54,19 @@ def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
     <Term cubic_stiffness: u**3; k3 = 2e+07>
     """
     given: dict[object, object] = {"term": name, **({} if force is None else {"force": force}), **values}
-    return Term.of(model_file.entry_from(given))
+    return Term.of(replace(model_file.entry_from(given), place=_place(name, at, between, couples)))
+
+
+def _place(
+    name: str, at: str | None, between: Sequence[str] | None, couples: Sequence[str] | None = None
+) -> Place:  # fmt: skip
+    """Where a term acts; a single mass has one place, which nobody names."""
+    ends = {"at": None if at is None else (at,), "between": between, "couples": couples}
+    said = [(cast(Kind, kind), tuple(given)) for kind, given in ends.items() if given is not None]
+    expect(len(said) < 2, f"{name} has {' and '.join(kind for kind, _ in said)}; expected one of them")
+    for kind, ends in said:
+        expect(kind == "at" or len(ends) == 2, f"{kind} of {name} is {list(ends)}; expected two coordinates")
+    return Place(*said[0]) if said else HERE
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,7 +76,7 @@ class Term(ModelTerm):
     @classmethod
     def of(cls, entry: ModelTerm) -> "Term":
         """An entry of the packages below as one of this interface."""
-        return cls(entry.term, entry.coefficients, entry.parameters)
+        return cls(entry.term, entry.coefficients, entry.parameters, entry.place)
 
     def __repr__(self) -> str:
         """One line: name, formula and what is held."""
@@ -91,6 +110,10 @@ class Model:
         Names of effects of the library, or :func:`term` with values that a fit holds.
     name : str
         What it is called in tables.
+    coordinates : sequence of str
+        Of a structure: where sensors, forces and terms are. Each term then says where it acts.
+    forces : mapping of str, optional
+        Of a structure: name of each measured force to the coordinate on which it acts.
 
     Attributes
     ----------
@@ -100,7 +123,7 @@ class Model:
     Raises
     ------
     StudyError
-        If an effect is not known, or two of them are the same force.
+        If an effect is not known, two of them are the same force, or the terms make no structure of the coordinates.
 
     Examples
     --------
@@ -110,12 +133,23 @@ class Model:
 
     equation: equations.Model
 
-    def __init__(self, *terms: "str | ModelTerm", name: str = "model") -> None:
+    def __init__(
+        self, *terms: "str | ModelTerm", name: str = "model", coordinates: Sequence[str] = (),
+        forces: Mapping[str, str] | None = None,
+    ) -> None:  # fmt: skip
         entries = tuple(term(t) if isinstance(t, str) else t for t in terms)
         expect(entries, "a model needs terms; expected some such as Model('inertia', 'linear_stiffness')")
-        made = equations.Model(name, tuple(ModelTerm(e.term, e.coefficients, e.parameters) for e in entries))
-        fault = repeated_force(made)
-        expect(fault is None, str(fault))
+        made = equations.Model(
+            name, tuple(ModelTerm(e.term, e.coefficients, e.parameters, e.place) for e in entries),
+        )  # fmt: skip
+        if coordinates:
+            made = replace(made, coordinates=tuple(coordinates), forces=tuple((forces or {}).items()))
+            made = model_file.parse_model(model_file.format_model(made), Path(name))  # with the checks of a file
+        else:
+            placed = [e.name for e in entries if e.place != HERE] + list(forces or {})
+            expect(not placed, f"{', '.join(placed)} has a place; expected coordinates=[...] beside it")
+            fault = repeated_force(made)
+            expect(fault is None, str(fault))
         object.__setattr__(self, "equation", made)
 
     @classmethod
@@ -132,15 +166,11 @@ class Model:
         Raises
         ------
         StudyError
-            If the file cannot be read or is no model of a single mass, naming the file, the value and what was
-            expected.
+            If the file cannot be read or is no model, naming the file, the value and what was expected.
         """
         made = model_file.read_model(Path(path))
-        expect(
-            not made.named,
-            f"{path}: this is a structure with the coordinates {', '.join(made.coordinates)}, which 'study compare', "
-            "'study diagnose' and 'study explore' take; expected a model of a single mass in a notebook",
-        )
+        modal = f"{path}: 'linear: modal' is for 'study compare' and 'study diagnose'"
+        expect(made.modal is None, f"{modal}; expected inertia at every coordinate in a notebook")
         return cls.of(made)
 
     def save(self, path: str | Path, *, values: bool = True) -> None:
@@ -200,14 +230,38 @@ class Model:
         for key in keys:
             expect(key in self.values, f"model {self.name!r} has no value {key!r}; expected {', '.join(self.values)}")
 
-    def add(self, added: "str | ModelTerm") -> "Model":
-        """The model with a term more; a ``StudyError`` if it has that force already."""
-        return Model(*self.equation.terms, added, name=self.name)
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Those of a structure; none of a single mass."""
+        return self.equation.coordinates if self.equation.named else ()
 
-    def drop(self, name: str) -> "Model":
-        """The model without a term; a ``StudyError`` if it lacks it or has no other."""
-        expect(name in self.terms, f"model {self.name!r} has no term {name!r}; expected {', '.join(self.terms)}")
-        return Model(*(t for t in self.equation.terms if t.name != name), name=self.name)
+    def add(
+        self, added: "str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
+    ) -> "Model":  # fmt: skip
+        """The model with a term more, of a structure at its place; a ``StudyError`` if it has that force already."""
+        entry = term(added) if isinstance(added, str) else added
+        if at is not None or between is not None:
+            entry = replace(entry, place=_place(entry.term.name, at, between))
+        return self._with_terms(*self.equation.terms, entry)
+
+    def drop(self, name: str, *, at: str | None = None, between: Sequence[str] | None = None) -> "Model":
+        """The model without a term, of a structure that at its place or by its full name.
+
+        A ``StudyError`` if it lacks it or has no other.
+        """
+        from study.diagnose.dropping import term_at
+
+        place = _place(name, at, between)
+        gone = term_at(self.equation, name, None if place == HERE else place) if self.equation.named else name
+        expect(gone in self.terms, f"model {self.name!r} has no term {name!r}; expected {', '.join(self.terms)}")
+        return self._with_terms(*(t for t in self.equation.terms if t.name != gone))
+
+    def _with_terms(self, *entries: ModelTerm) -> "Model":
+        return Model(*entries, name=self.name, coordinates=self.coordinates, forces=self._forces)
+
+    @property
+    def _forces(self) -> dict[str, str] | None:
+        return dict(self.equation.forces) if self.equation.named else None
 
     def fit(
         self, record: "Record | Sequence[Record]", *, fit: Samples | None = None,

@@ -16,7 +16,7 @@ from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
 from study.faults.fault import Fault, settings_asked
 from study.interface.data import Record
-from study.interface.equation import Model, Samples, Times, term
+from study.interface.equation import Model, Samples, Times
 from study.interface.forces import Force, simulate
 from study.interface.pictures import FitPictures
 from study.interface.showing import Words, html_table
@@ -91,21 +91,43 @@ class Fit(FitPictures):
 
     @property
     def f_n(self) -> Number | None:
-        """Natural frequency of the linear part in hertz, (4.4); None without mass, or stiffness above zero."""
+        """Natural frequency of the linear part in hertz, (4.4); of a structure the lowest.
+
+        None without mass, or stiffness above zero.
+        """
         return self._natural(0)
 
     @property
     def zeta(self) -> Number | None:
-        """Damping ratio of the linear part, (4.5); None without mass, damping, or stiffness above zero."""
+        """Damping ratio of that mode, (4.5); None without mass, damping, or stiffness above zero."""
         return self._natural(1)
 
     def _natural(self, which: int) -> Number | None:
         found = self.comparison.natural[which]
         return None if found is None else Number(*found)
 
+    def modes(self) -> "pd.DataFrame":
+        """The modes of the linear part, one row each: frequency in hertz, damping and shape with standard errors."""
+        import pandas as pd
+
+        found = self.comparison.modes
+        table: dict[str, Any] = {
+            "frequency": found.frequency, "frequency_error": found.frequency_error,
+            "damping": found.damping, "damping_error": found.damping_error,
+        }  # fmt: skip
+        for i, name in enumerate(self.given.coordinates):
+            table |= {f"shape at {name}": found.shape[:, i], f"error at {name}": found.shape_error[:, i]}
+        return pd.DataFrame(table, index=pd.RangeIndex(1, len(found.frequency) + 1, name="mode"))
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """The same by sensor."""
+        found = self.comparison.prediction
+        return {str(s): float(e) for s, e in zip(found.prepared.outputs.sensors, found.errors, strict=True)}
+
     @property
     def error(self) -> float:
-        """Rms of the held-out difference over that of the response."""
+        """Rms of the held-out difference over that of the response; over all sensors, if there are several."""
         return self.comparison.prediction.error
 
     @property
@@ -116,7 +138,7 @@ class Fit(FitPictures):
     @property
     def force_error(self) -> float:
         """Share of the force's power that the model does not explain in reverse."""
-        return self.comparison.force.total
+        return self.comparison.force_error
 
     @property
     def fit_percent(self) -> float:
@@ -131,13 +153,19 @@ class Fit(FitPictures):
         return Words(comparison_in_words(self.comparison))
 
     def response_functions(self) -> ResponseFunctions:
-        """Response over force by frequency, measured and predicted, with coherences."""
+        """Response over force by frequency, measured and predicted, with coherences.
+
+        Of a structure those of its first sensor and force.
+        """
         from study.compare.response_functions import response_functions
 
         return response_functions(self.comparison.prediction)
 
     def residual_checks(self) -> ResidualChecks:
-        """Correlations of the held-out residual with itself and with the force, with 99 % bands, and its histogram."""
+        """Correlations of the held-out residual with itself and with the force, with 99 % bands, and its histogram.
+
+        Of a structure those of its first sensor and force.
+        """
         from study.compare.residual_checks import residual_checks
 
         return residual_checks(self.comparison.prediction)
@@ -193,6 +221,8 @@ class Fit(FitPictures):
         StudyError
             If the response does not stay finite.
         """
+        structure = "a structure is not simulated in a notebook; 'study simulate' takes its model file"
+        expect(not self.given.coordinates, f"{structure}, and Fit.model.save writes one")
         if not isinstance(force, Force | Record):
             values = np.asarray(force, dtype=np.float64)
             expect(values.ndim == 1 and len(values) > 1, f"force has the shape {values.shape}; expected one row")
@@ -220,11 +250,14 @@ class Fit(FitPictures):
 
         return diagnosed(self, candidates or {}, without)
 
-    def add(self, added: "Candidate | str | ModelTerm") -> "Fit":
+    def add(
+        self, added: "Candidate | str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
+    ) -> "Fit":  # fmt: skip
         """The fit of the model with an effect more.
 
-        A candidate of its diagnosis begins where its fit ended; of an effect of the library by name, or a :func:`term`,
-        what it gives is held and the rest is fitted as a diagnosis would.
+        A candidate of its diagnosis begins where its fit ended, at the place that was found; of an effect of the
+        library by name, or a :func:`term`, what it gives is held and the rest is fitted as a diagnosis would. In a
+        structure it acts ``at`` a coordinate or ``between`` two.
 
         Raises
         ------
@@ -237,17 +270,22 @@ class Fit(FitPictures):
 
         if isinstance(added, Candidate):
             return replace(self, comparison=added_candidate(self.comparison, added.ranked))
-        entry = term(added) if isinstance(added, str) else added
-        larger = self.given.add(entry)
+        larger = self.given.add(added, at=at, between=between)
+        entry = larger.equation.terms[-1]
         if any(value is not None for value in entry.values.values()):
             return replace(self, comparison=compare(larger.equation, self.comparison.prepared))
-        return replace(self, comparison=grown(self.comparison, entry.term))
+        return replace(self, comparison=grown(self.comparison, entry))
 
-    def drop(self, name: str) -> "Fit":
-        """The fit of the model without one of its terms; a ``StudyError`` if it cannot go."""
+    def drop(self, name: str, *, at: str | None = None, between: Sequence[str] | None = None) -> "Fit":
+        """The fit of the model without one of its terms, of a structure that at its place or by its full name.
+
+        A ``StudyError`` if it cannot go.
+        """
         from study.diagnose.dropping import compared_without
 
-        return replace(self, comparison=compared_without(self.comparison, name))
+        kept = self.given.drop(name, at=at, between=between).terms if self.given.coordinates else ()
+        gone = next((t for t in self.given.terms if t not in kept), name) if kept else name
+        return replace(self, comparison=compared_without(self.comparison, gone))
 
     def across(self, records: "Sequence[Record]", **options: Any) -> "Across":
         """The same model fitted to several records: do its coefficients move with the level?
@@ -272,6 +310,10 @@ class Fit(FitPictures):
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
         from study.support.extras import needed
 
+        if self.given.coordinates:
+            from study.structure.structure_page import structure_page
+
+            return structure_page(self.comparison)
         needed("bokeh", "the page", "explore")
         from study.explore.saved import of_comparison
 

@@ -110,11 +110,7 @@ class Diagnosis:
     @property
     def candidates(self) -> tuple[Candidate, ...]:
         """All that were tried, best first."""
-        units = self.result.comparison.record.units
-        force, length = units.get("force", "N"), units.get("displacement", "m")
-        return tuple(
-            Candidate(r, r.term.unit(r.term.symbols[0], force, length)) for r in self.result.candidates
-        )  # fmt: skip
+        return tuple(Candidate(r, r.unit) for r in self.result.candidates)
 
     @property
     def best(self) -> Candidate | None:

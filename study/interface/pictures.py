@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from study.compare.comparison import Comparison
+    from study.compare.prediction import SensorPrediction
 
 
 class FitPictures:
@@ -19,27 +20,31 @@ class FitPictures:
 
     comparison: "Comparison"
 
-    def plot(self, ax: "Axes | None" = None, *, closeup: bool = False) -> "Axes":
-        """Measured and predicted response of the judging part, or some cycles where the model misses most."""
+    def plot(self, ax: "Axes | None" = None, *, closeup: bool = False, sensor: str | None = None) -> "Axes":
+        """Measured and predicted response of the judging part, or some cycles where the model misses most.
+
+        Of a structure that of a ``sensor`` by its name, or of the one that the model misses most.
+        """
         from study.compare.panels import response_panel
 
-        prediction = self.comparison.prediction.of(0)
+        prediction = self._seen(sensor)
         part = prediction.closeup if closeup else slice(None)
         with drawing_axes(ax) as (axes,):
             response_panel(
-                axes, prediction.time[part], prediction.measured[part], prediction.predicted[part], self._unit()
-            )
+                axes, prediction.time[part], prediction.measured[part], prediction.predicted[part],
+                self._unit(prediction),
+            )  # fmt: skip
             axes.legend(loc="upper right")
             axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}")
         return axes
 
-    def plot_residual(self, ax: "Axes | None" = None) -> "Axes":
-        """What the model misses of the judging part, beside twice the noise floor."""
+    def plot_residual(self, ax: "Axes | None" = None, *, sensor: str | None = None) -> "Axes":
+        """What the model misses of the judging part beside twice the noise floor; ``sensor`` as for :meth:`plot`."""
         from study.compare.panels import residual
 
-        prediction = self.comparison.prediction.of(0)
+        prediction = self._seen(sensor)
         with drawing_axes(ax) as (axes,):
-            residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit())
+            residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit(prediction))
             axes.legend(loc="upper right")
         return axes
 
@@ -54,11 +59,12 @@ class FitPictures:
         from study.support.errors import expect
 
         expect(part in ("magnitude", "phase", "coherence"), f"part is {part!r}; expected magnitude, phase or coherence")
+        _of_one_mass(self.comparison, "plot_frf")
         functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
         with drawing_axes(ax) as (axes,):
             if part == "magnitude":
                 drive = drive_of(self.comparison.prepared)
-                unit = f"{self._unit()}/{self.comparison.record.units.get(drive, '')}"
+                unit = f"{self._unit(self._seen(None))}/{self.comparison.record.units.get(drive, '')}"
                 return fit_panels.response_magnitude(axes, functions, unit, highest)
             return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
                 axes, functions, highest
@@ -89,13 +95,18 @@ class FitPictures:
             return fit_panels.residual_histogram(axes, residual_checks(self.comparison.prediction))
 
     def plot_missing_force(self, against: str = "displacement", ax: "Axes | None" = None) -> "Axes":
-        """Mean force that the model lacks against ``displacement`` or ``velocity``, with 95 % intervals."""
+        """Mean force that the model lacks against ``displacement`` or ``velocity``, with 95 % intervals.
+
+        Of a structure that at the place where most is missing.
+        """
         from study.compare.force_map import curve
         from study.compare.panels import force_curve
         from study.support.errors import expect
 
         expect(against in ("displacement", "velocity"), f"against is {against!r}; expected displacement or velocity")
         lacking, units = self.comparison.missing_force, dict(self.comparison.record.units)
+        if self.comparison.model.named:
+            units |= self.comparison.missing.units(self.comparison.place.label)
         motion = lacking.displacement if against == "displacement" else lacking.velocity
         with drawing_axes(ax) as (axes,):
             return force_curve(axes, curve(motion[lacking.inner], lacking.force[lacking.inner]), against, units)
@@ -104,10 +115,26 @@ class FitPictures:
         """Unexplained share of the force by frequency."""
         from study.compare.panels import force_error_panel
 
+        _of_one_mass(self.comparison, "plot_force_error")
         with drawing_axes(ax) as (axes,):
             drawn = force_error_panel(axes, self.comparison.force, self.comparison.force.highest)
             drawn.legend(loc="upper right")
         return drawn
 
-    def _unit(self) -> str:
-        return dimensions.pretty(self.comparison.record.units.get(self.comparison.plan.response, ""))
+    def _seen(self, sensor: str | None) -> "SensorPrediction":
+        from study.support.errors import expect
+
+        views = {str(view.sensor): view for view in self.comparison.views}
+        expect(sensor is None or sensor in views, f"sensor is {sensor!r}; expected one of {', '.join(views)}")
+        return self.comparison.worst if sensor is None else views[sensor]
+
+    def _unit(self, seen: "SensorPrediction") -> str:
+        return dimensions.pretty(self.comparison.record.units.get(str(seen.sensor), ""))
+
+
+def _of_one_mass(comparison: "Comparison", what: str) -> None:
+    from study.support.errors import expect
+
+    expect(
+        not comparison.model.named, f"{what} is of a single mass; expected one of plot, plot_residual for a structure"
+    )
