@@ -95,7 +95,11 @@ def unexplained(base: Baseline) -> Unexplained:
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
     joined = bool(prepared.record.stretches)
     states = 0 if fit.restarts or joined or prepared.response == FORCE else len(motions)
-    rows = [free, fit.residual, _columns(with_states(shaped, prepared), len(shaped.keys), states, joined)]
+    try:
+        slopes = with_states(shaped, prepared)
+    except DivergenceError:  # what shapes add may leave the range of numbers where the motion does not
+        exact, shaped, slopes = {}, fit, with_states(fit, prepared)
+    rows = [free, fit.residual, _columns(slopes, len(shaped.keys), states, joined)]
     spans = [fit.span]
     try:
         run = judging_run(fit, prepared)

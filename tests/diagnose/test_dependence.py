@@ -91,3 +91,26 @@ def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():
     size = np.std(made.record["displacement"])
     assert np.std(fit.residual) > 0.8 * size
     assert np.std(tried.prediction.residual) < 0.3 * size
+
+
+def test_shapes_whose_derivatives_diverge_pass_through_the_linear_system(monkeypatch, systems, records):
+    """A pair of a trial (560253) ended its diagnosis so: what a seventh power adds grew without end, the motion not."""
+    from study.support.errors import DivergenceError
+
+    prepared = prepare_record(records["duffing"])
+    base = shape_search.baseline(fit_model(systems["linear"].with_values({"c": None, "k": None}), prepared), prepared)
+    exact = dependence.unexplained(base)
+    real = dependence.with_states
+
+    def diverging(fit, prepared):
+        if len(fit.keys) > len(base.fit.keys):
+            raise DivergenceError("the free run diverged", 0.0)
+        return real(fit, prepared)
+
+    monkeypatch.setattr(dependence, "with_states", diverging)
+    passed = dependence.unexplained(base)
+    assert exact.shapes
+    assert not passed.shapes
+    found, again = ({f.family: f.gain.explained for f in dependence.families(left)} for left in (exact, passed))
+    assert found["displacement"] > 0.5
+    assert again["displacement"] > 0.5
