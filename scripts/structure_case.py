@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from study.compare.modal_comparison import compare_modal
 from study.equations.model_file import read_model
 from study.figures import page
 from study.records.prepared import prepare_record
@@ -15,7 +16,6 @@ from study.reproduction.structure_cases import (
     make_structure_record,
     measured_model,
 )
-from study.structure.measured_comparison import compare_measured
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence
 
@@ -30,7 +30,7 @@ def main(
         write_csv(record, beside)
     if case.measured:  # by its own modes
         assumed = measured_model(structure, case.sensors)
-        comparison = compare_measured(assumed, prepare_record(record))
+        comparison = compare_modal(assumed, prepare_record(record))
         told = (case, structure, comparison, settings)
         responses = structure_tables.modal_responses(*told)
         made = {

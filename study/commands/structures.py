@@ -48,16 +48,16 @@ def modal_records(arguments: argparse.Namespace, model: "Model") -> "list[Prepar
 def compare_modal_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study compare`` where the linear part is as measured."""
     from study.compare.comparison_report import as_json
-    from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
+    from study.compare.modal_comparison import compare_modal, modal_document, modal_summary
     from study.support.files import write_files
 
     folder, ready = out_folder(arguments), modal_records(arguments, model)
     with progress("step", 3 * len(ready)) as step:
-        comparisons = [compare_measured(model, prepared, step) for prepared in ready]
+        comparisons = [compare_modal(model, prepared, step) for prepared in ready]
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
-    files = {f"{p}comparison.json": as_json(measured_document(c)) for p, c in zip(prefix, comparisons, strict=True)}
+    files = {f"{p}comparison.json": as_json(modal_document(c)) for p, c in zip(prefix, comparisons, strict=True)}
     write_files(folder, files)
-    print("\n\n".join(measured_summary(c) for c in comparisons))
+    print("\n\n".join(modal_summary(c) for c in comparisons))
     print(f"\n{folder}: {', '.join(files)}")
 
 
@@ -72,19 +72,19 @@ def refuse_modal(model: "Model", command: str) -> None:
 def diagnose_modal_command(arguments: argparse.Namespace, model: "Model", own: "list[Term]") -> None:
     """``study diagnose`` where the linear part is a sum of modes."""
     from study.compare.comparison_report import as_json
-    from study.structure.measured_comparison import compare_measured
-    from study.structure.measured_diagnosis import diagnose_measured
-    from study.structure.measured_report import measured_fields, measured_in_words, measured_table
+    from study.compare.modal_comparison import compare_modal
+    from study.diagnose.modal_diagnosis import diagnose_modal
+    from study.diagnose.modal_report import modal_fields, modal_in_words, modal_table
     from study.support.files import write_files
 
     folder, files, ready = out_folder(arguments), dict[str, bytes](), modal_records(arguments, model)
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
-            diagnosis = diagnose_measured(compare_measured(model, prepared), own, arguments.without, progress=step)
+            diagnosis = diagnose_modal(compare_modal(model, prepared), own, arguments.without, progress=step)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
-        print(f"{measured_table(diagnosis)}\n\n{measured_in_words(diagnosis)}")
+        print(f"{modal_table(diagnosis)}\n\n{modal_in_words(diagnosis)}")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
-        files[f"{prefix}diagnosis.json"] = as_json(measured_fields(diagnosis))
+        files[f"{prefix}diagnosis.json"] = as_json(modal_fields(diagnosis))
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {', '.join(files)}")
 
@@ -98,19 +98,19 @@ def revise_modal(
     """
     from study.compare import history
     from study.compare.comparison_report import as_json
-    from study.structure.measured_comparison import (
-        compare_measured,
-        measured_document,
-        measured_step,
-        measured_summary,
+    from study.compare.modal_comparison import (
+        compare_modal,
+        modal_document,
+        modal_step,
+        modal_summary,
     )
 
     steps, summaries, document = history.read_history(arguments.model), list[str](), b""
     for prepared in modal_records(arguments, model):
-        before, after = (compare_measured(m, prepared) for m in (model, changed))
-        steps = history.with_step(steps, measured_step(before), measured_step(after, **told))
-        document = as_json(measured_document(after))
-        summaries.append(measured_summary(after))
+        before, after = (compare_modal(m, prepared) for m in (model, changed))
+        steps = history.with_step(steps, modal_step(before), modal_step(after, **told))
+        document = as_json(modal_document(after))
+        summaries.append(modal_summary(after))
     written_together(arguments, text, steps, document, folder)
     print("\n\n".join(summaries))
     print("\n" + history.history_table(steps))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from study.compare.modal_comparison import ModalComparison
 from study.equations.linear_part import modes_of, transfer
 from study.equations.model import Model
 from study.identify.frequency_domain.conditioned import MisoResult
@@ -25,7 +26,6 @@ from study.reproduction.tables import (
     judge_estimate,
     stacked,
 )
-from study.structure.measured_comparison import MeasuredComparison
 from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 
@@ -119,7 +119,7 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
 
 
 def modal_parameters(
-    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients with their tolerance, then natural frequencies and damping ratios beside the exact ones."""
     modes, exact = comparison.modes, modes_of(truth)
@@ -143,7 +143,7 @@ def modal_parameters(
 
 
 def modal_responses(
-    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones."""
     parts: list[tuple[Any, ...]] = []
@@ -204,7 +204,7 @@ def structure_claims(
 
 
 def modal_claims(
-    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
 ) -> pd.DataFrame:
     """The same of a case whose linear part is as measured."""
     return _judged(case, measured=_modal(case, truth, comparison, settings))
@@ -261,7 +261,7 @@ def _reaction(result: CaseResult, settings: StructureSettings) -> Iterable[Condi
 
 
 def _modal(
-    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
 ) -> Iterable[Condition]:
     allowed = settings.tolerances.measured
     for key in comparison.model.values:

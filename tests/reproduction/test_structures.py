@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.compare.modal_comparison import compare_modal
 from study.equations.model_file import read_model
 from study.records.prepared import prepare_record
 from study.reproduction.structure_cases import (
@@ -27,7 +28,6 @@ from study.reproduction.structure_tables import (
     structure_responses,
 )
 from study.reproduction.tables import judge_estimate
-from study.structure.measured_comparison import compare_measured
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -119,7 +119,7 @@ def test_the_beam_is_found_by_its_own_modes():
     record, model = make_structure_record(structure, case, settings), measured_model(structure, case.sensors)
     assert [str(s) for s in record.sensors] == [f"{p} displacement" for p in case.sensors]
     assert model.values == {"k3[ground-p10]": None}
-    comparison = compare_measured(model, prepare_record(record))
+    comparison = compare_modal(model, prepare_record(record))
     (claim,) = modal_claims(case, structure, comparison, settings).to_dict("records")
     assert claim["verdict"] == "holds", claim["measured"]
     table = modal_parameters(case, structure, comparison, settings)

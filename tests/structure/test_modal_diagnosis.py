@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from study.cli import main
+from study.compare.modal_comparison import compare_modal
+from study.diagnose.modal_diagnosis import between_sensors, diagnose_modal, modal_entries
+from study.diagnose.modal_report import modal_in_words
 from study.equations.model_file import parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
@@ -15,9 +18,6 @@ from study.identify.time_domain.modal_fit import modal_fit
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
 from study.records.record import Sensor, write_csv
-from study.structure.measured_comparison import compare_measured
-from study.structure.measured_diagnosis import between_sensors, diagnose_measured, measured_entries
-from study.structure.measured_report import measured_in_words
 
 ROOT = Path(__file__).parents[2]
 DT, SAMPLES = 0.005, 4000
@@ -69,16 +69,16 @@ def test_effect_and_place_are_named_and_add_finds_the_coefficient(folder, capsys
 def test_nothing_is_missing_from_the_right_model(record):
     model = parse_model(BARE.replace("[]", "\n  - {term: cubic_stiffness, between: [ground, p10]}"), Path("right.yaml"))
     asked = tuple(name for name in LIBRARY if name != "quadratic_stiffness")
-    diagnosis = diagnose_measured(compare_measured(model, prepare_record(record)), without=asked)
+    diagnosis = diagnose_modal(compare_modal(model, prepare_record(record)), without=asked)
     assert diagnosis.verdict == "nothing_missing"
-    assert "Nothing is missing" in measured_in_words(diagnosis)
+    assert "Nothing is missing" in modal_in_words(diagnosis)
 
 
 def test_candidates_are_nonlinear_effects_between_sensors(record):
     model = parse_model(BARE, Path("bare.yaml"))
     prepared = prepare_record(record)
     assert len(between_sensors(model, prepared)) == 3
-    names = {e.term.name for e in measured_entries(model, prepared)}
+    names = {e.term.name for e in modal_entries(model, prepared)}
     assert {"cubic_stiffness", "hysteresis", "dead_band", "coulomb_friction"} <= names
     assert not names & {
         "linear_stiffness",
@@ -100,7 +100,7 @@ def test_an_open_shape_parameter_is_searched_for():
     record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 16))
     shown = record.with_motions({s: x for s, x in record.motions.items() if s.motion == "displacement"})
     model = parse_model(f"{place}linear: modal\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
-    comparison = compare_measured(model, prepare_record(shown))
+    comparison = compare_modal(model, prepare_record(shown))
     true, found = whole.numbers(), comparison.values
     assert "dead_band[x].u_g" in comparison.fit.keys
     assert found["dead_band[x].u_g"] == pytest.approx(true["dead_band[x].u_g"], rel=0.02)

@@ -3,17 +3,17 @@
 import math
 from typing import Any
 
+from study.compare.modal_comparison import modal_document, modal_says
+from study.diagnose.modal_diagnosis import ModalDiagnosis, ModalRanked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
-from study.structure.measured_comparison import measured_document, measured_says
-from study.structure.measured_diagnosis import MeasuredDiagnosis, MeasuredRanked
 from study.support.numbers import percent
 
 SHOWN, TIES = 8, 2  # candidates in the table on the screen; ties named there
 
 
-def measured_table(diagnosis: MeasuredDiagnosis) -> str:
+def modal_table(diagnosis: ModalDiagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     from tabulate import tabulate
 
@@ -25,7 +25,7 @@ def measured_table(diagnosis: MeasuredDiagnosis) -> str:
     return f"{shown}\n... and {more} more, in diagnosis.json; {rest} promise too little to be fitted"
 
 
-def _shown(number: int, row: MeasuredRanked) -> list[str]:
+def _shown(number: int, row: ModalRanked) -> list[str]:
     more = f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else ""
     return [
         str(number), row.term.name, row.entry.place.label if row.entry.place else "",
@@ -35,15 +35,15 @@ def _shown(number: int, row: MeasuredRanked) -> list[str]:
     ]  # fmt: skip
 
 
-def _unit(row: MeasuredRanked) -> str:
+def _unit(row: ModalRanked) -> str:
     return row.term.unit(row.term.symbols[0], *row.prediction.prepared.record.force_and_length)
 
 
-def _named(row: MeasuredRanked) -> str:
+def _named(row: ModalRanked) -> str:
     return f"{term_names(row.term.name)} {placed(row.entry.place) if row.entry.place else ''}".strip()
 
 
-def measured_in_words(diagnosis: MeasuredDiagnosis) -> str:
+def modal_in_words(diagnosis: ModalDiagnosis) -> str:
     """What to tell the engineer."""
     before = diagnosis.comparison.prediction
     if diagnosis.verdict == NOTHING:
@@ -75,7 +75,7 @@ def measured_in_words(diagnosis: MeasuredDiagnosis) -> str:
     return " ".join(said)
 
 
-def _unknown(diagnosis: MeasuredDiagnosis) -> str:
+def _unknown(diagnosis: ModalDiagnosis) -> str:
     before = diagnosis.comparison.prediction
     said = (
         f"Something is missing that no candidate between the sensors explains: the error of the motions is "
@@ -88,20 +88,20 @@ def _unknown(diagnosis: MeasuredDiagnosis) -> str:
     return said
 
 
-def measured_fields(diagnosis: MeasuredDiagnosis) -> dict[str, Any]:
+def modal_fields(diagnosis: ModalDiagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds; candidates best first."""
-    whole = measured_document(diagnosis.comparison)
+    whole = modal_document(diagnosis.comparison)
     rows = {r.name: r for r in diagnosis.candidates}
     return {
         "verdict": diagnosis.verdict, "record": whole["record"], "model": whole["model"], "error": whole["error"],
         "noise_floor": whole["noise_floor"], "candidates": [_candidate(r, rows) for r in diagnosis.candidates],
         "asked": diagnosis.asked, "left": diagnosis.left, "modes": {"before": whole["modes"]},
         "converged": diagnosis.comparison.fit.converged,
-        "says": f"{measured_says(diagnosis.comparison)} {measured_in_words(diagnosis)}",
+        "says": f"{modal_says(diagnosis.comparison)} {modal_in_words(diagnosis)}",
     }  # fmt: skip
 
 
-def _candidate(row: MeasuredRanked, rows: dict[str, MeasuredRanked]) -> dict[str, Any]:
+def _candidate(row: ModalRanked, rows: dict[str, ModalRanked]) -> dict[str, Any]:
     return {
         "term": row.term.name, **_place(row), "parameters": row.parameters, "parameter_errors": row.parameter_errors,
         "coefficient": row.coefficient, "interval": list(row.interval), "response_error": row.prediction.error,
@@ -117,5 +117,5 @@ def _candidate(row: MeasuredRanked, rows: dict[str, MeasuredRanked]) -> dict[str
     }  # fmt: skip
 
 
-def _place(row: MeasuredRanked) -> dict[str, Any]:
+def _place(row: ModalRanked) -> dict[str, Any]:
     return row.entry.place.plain() if row.entry.place else {}

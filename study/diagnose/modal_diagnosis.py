@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from study.compare.modal_comparison import ModalComparison
 from study.compare.prediction import predict
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
@@ -35,7 +36,6 @@ from study.identify.time_domain.shape_search import Screened
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.structure.measured_comparison import MeasuredComparison
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -54,7 +54,7 @@ def between_sensors(model: Model, prepared: Prepared) -> tuple[Place, ...]:
     return tuple(known.get(frozenset(ends), Place("between", ends)) for ends in pairs)
 
 
-def measured_entries(
+def modal_entries(
     model: Model, prepared: Prepared, extra: Sequence[Term] = (), without: Sequence[str] = ()
 ) -> list[ModelTerm]:
     """Every nonlinear effect at every place that the sensors show and where the model does not have it.
@@ -96,7 +96,7 @@ def _fits_in(model: Model, entry: ModelTerm) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredRanked(Ranked):
+class ModalRanked(Ranked):
     """One candidate with its coefficients line by line."""
 
     spectra: tuple[CoefficientSpectrum, ...] = ()  # none where they cannot be read
@@ -118,30 +118,30 @@ class MeasuredRanked(Ranked):
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredDiagnosis:
+class ModalDiagnosis:
     """What is missing between the sensors."""
 
     verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
-    comparison: MeasuredComparison
-    candidates: tuple[MeasuredRanked, ...]  # best first
+    comparison: ModalComparison
+    candidates: tuple[ModalRanked, ...]  # best first
     asked: int  # effects times places
     left: float  # rms over that of the motion that stands above white noise beside the best explanation
 
 
-def diagnose_measured(
-    comparison: MeasuredComparison, extra: Sequence[Term] = (), without: Sequence[str] = (),
+def diagnose_modal(
+    comparison: ModalComparison, extra: Sequence[Term] = (), without: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
-) -> MeasuredDiagnosis:  # fmt: skip
+) -> ModalDiagnosis:  # fmt: skip
     """Find the effect that a structure with a modal linear part lacks, and its place between sensors.
 
     ``extra`` are the user's own candidates, ``without`` terms of the library to leave out; ``progress`` is called with
     each candidate that was fitted.
     """
     model, prepared, fit = comparison.fit.model, comparison.prepared, comparison.fit
-    entries = measured_entries(model, prepared, extra, without)
+    entries = modal_entries(model, prepared, extra, without)
     ordered = screened_by_lines(model, prepared, entries, fit)
 
-    def tried(item: Screened) -> MeasuredRanked | None:
+    def tried(item: Screened) -> ModalRanked | None:
         row = _tried(item, comparison)
         if progress is not None:
             progress("")
@@ -164,14 +164,14 @@ def _promising(ordered: Sequence[Screened]) -> list[Screened]:
     return chosen
 
 
-def _shaped(comparison: MeasuredComparison) -> Model:
+def _shaped(comparison: ModalComparison) -> Model:
     """The model as it was given, shape parameters as they were fitted."""
     given = comparison.model
     shapes = {k for t in given.terms for k in t.keys[len(t.symbols) :]}
     return given.with_values({k: comparison.values[k] for k in shapes})
 
 
-def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | None:
+def _tried(item: Screened, comparison: ModalComparison) -> ModalRanked | None:
     prepared, before = comparison.prepared, comparison.prediction
     try:
         fit = with_modal_term(_shaped(comparison), item.entry, prepared)
@@ -183,13 +183,13 @@ def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | N
     covariance = uncertainty(fit, prepared, linearise(fit, prepared))
     coefficient, error, parameters, errors = ranked.amount(item.entry, fit.keys, fit.values, covariance)
     gain = statistics.gain(before.residual, prediction.residual)
-    return MeasuredRanked(
+    return ModalRanked(
         item.entry, fit, prediction, gain, 1.0, coefficient, error, parameters, errors, None, None,
         HeldOut(prediction.residual, np.zeros(0)), spectra=_spectra(fit, item, comparison),
     )  # fmt: skip
 
 
-def _spectra(fit: FreeRunFit, item: Screened, comparison: MeasuredComparison) -> tuple[CoefficientSpectrum, ...]:
+def _spectra(fit: FreeRunFit, item: Screened, comparison: ModalComparison) -> tuple[CoefficientSpectrum, ...]:
     """The candidate's coefficients line by line."""
     try:
         found = coefficient_spectra(fit, comparison.prepared)
@@ -198,7 +198,7 @@ def _spectra(fit: FreeRunFit, item: Screened, comparison: MeasuredComparison) ->
     return tuple(s for s in found if set(s.key.split(" + ")) & set(item.entry.symbols))
 
 
-def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> list[MeasuredRanked]:
+def _ranked(rows: list[ModalRanked], comparison: ModalComparison, asked: int) -> list[ModalRanked]:
     if not rows:
         return []
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
@@ -214,14 +214,14 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     return in_order(rows, white, asked)
 
 
-def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> MeasuredDiagnosis:
+def _decide(rows: list[ModalRanked], comparison: ModalComparison, asked: int) -> ModalDiagnosis:
     believed = [r for r in rows if credible(comparison.prediction, r.prediction, r.interval, r.p_value)]
     if not believed:
         left = comparison.prediction.above_noise
         verdict = UNKNOWN if left > TOLERANCE else NOTHING
-        return MeasuredDiagnosis(verdict, comparison, tuple(rows), asked, left)
+        return ModalDiagnosis(verdict, comparison, tuple(rows), asked, left)
     first = believed[0]
     left = first.prediction.above_noise
     enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
     ordered = (first, *(r for r in rows if r is not first))
-    return MeasuredDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)
+    return ModalDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)

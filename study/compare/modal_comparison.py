@@ -23,7 +23,7 @@ from study.support.numbers import percent
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredComparison:
+class ModalComparison:
     """A model with ``linear: modal`` held against one record."""
 
     model: Model  # as it was given
@@ -48,9 +48,7 @@ class MeasuredComparison:
         return float(np.sqrt(self.covariance[i, i]))
 
 
-def compare_measured(
-    model: Model, prepared: Prepared, progress: Callable[[str], None] | None = None
-) -> MeasuredComparison:
+def compare_modal(model: Model, prepared: Prepared, progress: Callable[[str], None] | None = None) -> ModalComparison:
     """Fit modes and what the terms leave open to one part of a record and judge the free run on the other.
 
     Shape parameters that are open are searched for along the lines of the record.
@@ -70,13 +68,13 @@ def compare_measured(
     notes = list(prepared.notes)
     if not fit.converged:
         notes.append(f"the fit has not converged: {fit.message}")
-    return MeasuredComparison(
+    return ModalComparison(
         model, prepared, fit, covariance, prediction, modes_of(fit.model, fit.keys, covariance),
         coefficient_spectra(fit, prepared), tuple(notes),
     )  # fmt: skip
 
 
-def measured_document(comparison: MeasuredComparison) -> dict[str, Any]:
+def modal_document(comparison: ModalComparison) -> dict[str, Any]:
     """What ``comparison.json`` holds."""
     fit, prediction, prepared = comparison.fit, comparison.prediction, comparison.prepared
     model = comparison.model
@@ -104,7 +102,7 @@ def measured_document(comparison: MeasuredComparison) -> dict[str, Any]:
             "samples": list(prepared.plan.fit), "judged": list(prepared.plan.judge), "converged": fit.converged,
             "message": fit.message,
         },
-        "notes": list(comparison.notes), "says": measured_says(comparison),
+        "notes": list(comparison.notes), "says": modal_says(comparison),
     }  # fmt: skip
 
 
@@ -122,7 +120,7 @@ def _plain(spectrum: CoefficientSpectrum) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def measured_says(comparison: MeasuredComparison) -> str:
+def modal_says(comparison: ModalComparison) -> str:
     """What a person wants to know, in sentences."""
     prediction = comparison.prediction
     said = [
@@ -139,7 +137,7 @@ def measured_says(comparison: MeasuredComparison) -> str:
     return " ".join(said)
 
 
-def measured_summary(comparison: MeasuredComparison) -> str:
+def modal_summary(comparison: ModalComparison) -> str:
     """The tables that a person reads first, and the sentences below them."""
     from tabulate import tabulate
 
@@ -158,16 +156,14 @@ def measured_summary(comparison: MeasuredComparison) -> str:
         f"judged on {last[0]} to {last[1]}",
         tabulate(sensors, ["sensor", "error", "noise floor"], tablefmt="simple", disable_numparse=True),
         tabulate(values, ["", "value", "standard error"], tablefmt="simple", disable_numparse=True),
-        modes_table(comparison.modes, comparison.model.coordinates), measured_says(comparison),
+        modes_table(comparison.modes, comparison.model.coordinates), modal_says(comparison),
     ]  # fmt: skip
     return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
 
 
-def measured_step(
-    comparison: MeasuredComparison, added: str | None = None, dropped: str | None = None
-) -> dict[str, Any]:
+def modal_step(comparison: ModalComparison, added: str | None = None, dropped: str | None = None) -> dict[str, Any]:
     """A comparison as a step of the history (``study.compare.history``); there is no error of the force."""
-    prediction, document = comparison.prediction, measured_document(comparison)
+    prediction, document = comparison.prediction, modal_document(comparison)
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.prepared.record.name, "error": {"force": None, "response": prediction.error},
