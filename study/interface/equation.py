@@ -61,12 +61,14 @@ def _place(
     name: str, at: str | None, between: Sequence[str] | None, couples: Sequence[str] | None = None
 ) -> Place:  # fmt: skip
     """Where a term acts; a single mass has one place, which nobody names."""
-    ends = {"at": None if at is None else (at,), "between": between, "couples": couples}
-    said = [(cast(Kind, kind), tuple(given)) for kind, given in ends.items() if given is not None]
-    expect(len(said) < 2, f"{name} has {' and '.join(kind for kind, _ in said)}; expected one of them")
-    for kind, ends in said:
-        expect(kind == "at" or len(ends) == 2, f"{kind} of {name} is {list(ends)}; expected two coordinates")
-    return Place(*said[0]) if said else HERE
+    given = {"at": None if at is None else (at,), "between": between, "couples": couples}
+    said = [kind for kind, ends in given.items() if ends is not None]
+    expect(len(said) < 2, f"{name} has {' and '.join(said)}; expected one of them")
+    if not said:
+        return HERE
+    kind, ends = cast(Kind, said[0]), tuple(given[said[0]] or ())
+    expect(kind == "at" or len(ends) == 2, f"{kind} of {name} is {list(ends)}; expected two coordinates")
+    return Place(kind, ends)
 
 
 @dataclass(frozen=True, repr=False)
