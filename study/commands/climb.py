@@ -6,7 +6,6 @@ from pathlib import Path
 
 from study.commands.parser import parser
 from study.commands.record_arguments import accounted_together, read_records
-from study.commands.structure_climb import SAVED, structure_climb
 from study.compare import history
 from study.compare.history_picture import history_files as history_pictures
 from study.diagnose import diagnosis_report
@@ -18,6 +17,8 @@ from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
 from study.support.files import read_text, write_files
+
+SAVED = "climb.html"  # the whole climb as one page
 
 
 def climb(
@@ -38,8 +39,6 @@ def climb(
     first = parse_model(text, model)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
-    if first.named:
-        return structure_climb(arguments, first, steps, folder)
     together = accounted_together(arguments, first, read_records(arguments, first), records[0])
     session = sessions.begin_with(together.comparison)
     for number in range(steps + 1):

@@ -1,7 +1,7 @@
 """``study explore``: the four steps on a page in the browser."""
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.commands import structures
 from study.commands.command import Command, progress, whole_number
@@ -36,7 +36,6 @@ def _run(arguments: argparse.Namespace) -> None:
     needed("bokeh", "'study explore'", "explore")
     from study.compare import history
     from study.explore.desk import Desk
-    from study.explore.live import AloneScene
     from study.explore.server import serve
     from study.support.files import keep, read_text
 
@@ -44,16 +43,9 @@ def _run(arguments: argparse.Namespace) -> None:
     keep([arguments.model], [folder / arguments.model.name])
     text, steps = read_text(arguments.model, WANTED), history.read_history(arguments.model)
     model = parse_model(text, arguments.model)
-    place = arguments.model, text, folder, inputs_of(arguments)
-    desk: Desk[Any]
-    if model.named:
-        from study.explore.placed_page import PLACED, PlacedScene
-
-        desk, scene = Desk(structures.session(arguments, model, steps), *place, deeds=PLACED), PlacedScene
-    else:
-        desk, scene = Desk(_begun(arguments, model, steps), *place), AloneScene
+    desk = Desk(_begun(arguments, model, steps), arguments.model, text, folder, inputs_of(arguments))
     try:
-        serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser), scene)
+        serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))
     except KeyboardInterrupt:
         print("\nended; what was not saved is gone")
 
@@ -64,7 +56,12 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     from study.explore import session as sessions
     from study.explore.by_record import Several, by_record, of_own
     from study.faults.accounting import Accounted
+    from study.support.errors import expect
 
+    more = arguments.records[1:] or arguments.each_record
+    sentence = f"{more and more[0]}: the page of a structure shows one record; expected no more"
+    expect(not (more and model.named), sentence)
+    structures.refuse_modal(model, "explore")
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate

@@ -2,11 +2,10 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.commands.command import progress
 from study.commands.record_arguments import (
-    accounted_together,
     inputs_of,
     layout_of,
     out_folder,
@@ -18,7 +17,6 @@ from study.commands.record_arguments import (
 if TYPE_CHECKING:
     from study.equations.model import Model
     from study.equations.term import Term
-    from study.explore.placed_session import PlacedSession
     from study.records.prepared import Prepared
 
 
@@ -114,18 +112,3 @@ def revise_modal(
     written_together(arguments, text, steps, document, folder)
     print("\n\n".join(summaries))
     print("\n" + history.history_table(steps))
-
-
-def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
-    """What ``study explore`` of a structure begins with."""
-    from study.compare.comparison import STEPS
-    from study.explore.placed_session import begin_placed
-    from study.support.errors import expect
-
-    several = arguments.records[1:] or arguments.each_record
-    expect(not several, f"{several and several[0]}: the page of a structure shows one record; expected no more")
-    refuse_modal(model, "explore")
-    (record,) = read_records(arguments, model)
-    with progress("step", STEPS) as step:
-        found = accounted_together(arguments, model, [record], arguments.records[0], progress=step)
-    return begin_placed(found.comparison, steps)

@@ -14,8 +14,8 @@ from jinja2 import Environment, FunctionLoader, Template
 
 from study.compare.history import label
 from study.explore import theme, words
-from study.explore.any_session import AnySession
 from study.explore.axis_scales import Columns
+from study.explore.session import Session
 
 ROOT = "study"  # of a document
 Row = tuple[str, str, Any]  # a model's name, one of its properties, and the value that a stage gives it
@@ -110,7 +110,7 @@ def history_height(steps: int) -> int:
     return 104 + 27 * max(steps, 2)
 
 
-def history_columns(session: AnySession) -> Columns:
+def history_columns(session: Session) -> Columns:
     """The history as columns: errors and noise floor in per cent by the name of the step."""
     steps = session.steps
     earlier = [label(step) for step in steps]
@@ -149,7 +149,7 @@ def template(name: str) -> Template:
     return Environment(autoescape=False, loader=FunctionLoader(_text)).get_template(name)
 
 
-def variables(session: AnySession, live: bool, *layers: str) -> dict[str, Any]:
+def variables(session: Session, live: bool, *layers: str) -> dict[str, Any]:
     """What the templates need beside the panels; style and script are those of all pages and of ``layers`` on them."""
     record, model = session.prepared.record.name, session.now.model.name
     style, script = ("".join(_text(f"{n}.{kind}") for n in ("page", *layers)) for kind in ("css", "js"))

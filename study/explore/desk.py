@@ -10,11 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
 
 from study.equations.model import Model
 from study.explore import session as sessions
-from study.explore.any_session import AnySession, undone
 from study.explore.saved_files import PAGE, files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
@@ -40,57 +38,11 @@ class OvertakenError(Exception):
     """The model that is being diagnosed is no longer the present one."""
 
 
-S = TypeVar("S", bound=AnySession)
-
-
-@dataclass(frozen=True)
-class Deeds(Generic[S]):
-    """What can be done with the sessions of one kind; every function gives a new session."""
-
-    added: Callable[[S, str], S]
-    dropped: Callable[[S, str], S]
-    undone: Callable[[S], S]
-    held: Callable[[S, str, bool], S]
-    tried: Callable[[S, str], S]
-    examined: Callable[[S, Callable[[int], None]], Any]  # the present stage, diagnosed; the number of candidates tried
-    with_stage: Callable[[S, Any], S]
-    by_itself: Callable[[S], S]  # the model fitted to each of several records too; the same where nothing is to do
-    drawn: Callable[[S], Drawn]  # the files of the present stage that Save would write, which takes a while
-    files: Callable[[S, str, str, bool, Drawn | None], dict[str, bytes]]  # all, by the model file's name and text
-
-
-def _by_itself(session: Session) -> Session:
-    asked = session.now.on_each and session.now.by_record is None
-    return sessions.by_itself(session) if asked else session
-
-
-def _drawn(session: Session) -> Drawn:
-    return of_stage(session.now, by_level=not session.several.separate)
-
-
-def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Stage:
-    return sessions.examined(session, progress)[0]
-
-
-OF_ONE_MASS = Deeds(
-    sessions.with_added, sessions.dropped, undone, sessions.with_held, sessions.tried, _examined,
-    sessions.with_stage, _by_itself, _drawn, files,
-)  # fmt: skip
-
-
-class Desk(Generic[S]):
+class Desk:
     """One session and whoever looks at it."""
 
-    def __init__(
-        self,
-        session: S,
-        model: Path,
-        text: str,
-        folder: Path,
-        inputs: Sequence[Path] = (),
-        deeds: Deeds[S] = OF_ONE_MASS,
-    ) -> None:
-        self.session, self.deeds = session, deeds
+    def __init__(self, session: Session, model: Path, text: str, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        self.session = session
         self.state = State()
         self.model, self.text, self.folder, self.inputs = model, text, folder, tuple(inputs)
         self.watchers: dict[object, Callable[[], None]] = {}
@@ -101,11 +53,11 @@ class Desk(Generic[S]):
         self._hand = ThreadPoolExecutor(1, "change")
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
-            "add": ("adding {}", lambda name: self._change(deeds.added(self.session, name))),
-            "drop": ("dropping {}", lambda name: self._change(deeds.dropped(self.session, name))),
-            "undo": ("undoing", lambda _: self._change(deeds.undone(self.session))),
-            "hold": ("holding {}", lambda key: self._change(deeds.held(self.session, key, True))),
-            "free": ("freeing {}", lambda key: self._change(deeds.held(self.session, key, False))),
+            "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
+            "drop": ("dropping {}", lambda name: self._change(sessions.dropped(self.session, name))),
+            "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
+            "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
+            "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
             "try": ("trying {}", self._try),
             "save": ("writing files", self._save),
         }
@@ -140,7 +92,7 @@ class Desk(Generic[S]):
         self._hand.shutdown(wait=False, cancel_futures=True)
         self._behind.shutdown(wait=False, cancel_futures=True)
 
-    def _tell(self, session: S | None = None, **state: str) -> None:
+    def _tell(self, session: Session | None = None, **state: str) -> None:
         """Change the state, perhaps the session, and call whoever watches."""
         with self._lock:
             self.state = replace(self.state, **state)
@@ -160,12 +112,12 @@ class Desk(Generic[S]):
             self._tell(None, **{place: f"a fault in the program, not in your input ({type(error).__name__}: {error})"})
         self._tell(busy="")
 
-    def _change(self, session: S) -> None:
+    def _change(self, session: Session) -> None:
         self._tell(session)
         self.diagnose()
 
     def _try(self, text: str) -> None:
-        session = self.deeds.tried(self.session, text)
+        session = sessions.tried(self.session, text)
         self._tell(session, accepted=text)
         self._behind.submit(self._examine, session.own)
         self._behind.submit(self._draw)
@@ -174,7 +126,7 @@ class Desk(Generic[S]):
         session = self.session
         with self._pen:
             ahead = self._drawn[1] if self._drawn[0] is session.now else None
-            contents = self.deeds.files(session, self.model.name, self.text, how == VALUES, ahead)
+            contents = files(session, self.model.name, self.text, how == VALUES, ahead)
         write_files(self.folder, contents, self.inputs)
         with_them = "with" if how == VALUES else "without"
         self._tell(
@@ -187,7 +139,7 @@ class Desk(Generic[S]):
             session = self.session
             if session.now.diagnosis is None or self._rest.is_set() or self._drawn[0] is session.now:
                 return
-            self._drawn = session.now, self.deeds.drawn(session)
+            self._drawn = session.now, of_stage(session.now, by_level=not session.several.separate)
 
     def _still(self, model: Model) -> None:
         """End what is done of a model that is no longer the present one."""
@@ -201,21 +153,21 @@ class Desk(Generic[S]):
         if asked.now.diagnosis is not None and own is None:
             return
 
-        def count(candidates: int) -> None:
+        def count(done: int, of: int) -> None:
             self._still(model)
-            self._tell(diagnosing=f"diagnosing: {candidates} candidates tried")
+            self._tell(diagnosing=f"diagnosing: {done} of {of} candidates tried")
 
         try:
             self._tell(diagnosing="diagnosing")
-            alone = self.deeds.by_itself(asked)
+            alone = sessions.by_itself(asked)
             if alone is not asked:
                 self._still(model)
                 with self._lock:
-                    self._tell(self.deeds.with_stage(self.session, alone.now))
+                    self._tell(sessions.with_stage(self.session, alone.now))
             asked = alone
-            stage = self.deeds.examined(asked, count)
+            stage, _ = sessions.examined(asked, count)
             with self._lock:
-                self._tell(self.deeds.with_stage(self.session, stage), diagnosing="")
+                self._tell(sessions.with_stage(self.session, stage), diagnosing="")
         except OvertakenError:
             self._tell(diagnosing="")
         except StudyError as error:

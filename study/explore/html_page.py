@@ -1,9 +1,10 @@
-"""The page of one coordinate: sources and panels put together, for a live document and for a saved one alike."""
+"""The page of a session: sources and panels put together, for a live document and for a saved one alike."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import any_page, check_plots, plots, theme
@@ -11,10 +12,12 @@ from study.explore.any_page import Page
 from study.explore.axis_scales import Columns
 from study.explore.check_columns import FREE, PRESCRIBED, kind_of
 from study.explore.page_units import in_text
-from study.explore.session import Session
-from study.explore.view import View
+from study.explore.placed_page import placed_columns, placed_page
+from study.explore.placed_view import PlacedView, placed_view
+from study.explore.session import Session, Stage
+from study.explore.view import View, view
 
-TEMPLATE = "alone.html"
+Seen = View | PlacedView
 GHOSTS: dict[str, Columns] = {
     **{f"{kind}_{name}": {x: [], "y": []} for kind in ("ghost", "pinned")
        for name, x in (("time", "t"), ("spectrum", "f"), ("u", "at"), ("v", "at"))},
@@ -29,8 +32,15 @@ BEGINS, ENDS = ("start", "reset_start"), ("end", "reset_end")  # of a range, the
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
-def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
+def seen_of(stage: Stage, step: int, live: bool = True, record: int = 0) -> Seen:
+    """What is drawn of a model, by its number in the session, on one of its records; only a ``live`` page can act."""
+    return placed_view(stage, step, live) if stage.model.named else view(stage, step, live, record)
+
+
+def build(seen: Seen, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
     """A page that shows one model, with the columns of its history; ``stores`` are further sources of its script."""
+    if isinstance(seen, PlacedView):
+        return placed_page(seen, history, stores)
     t = seen.columns["time"]["t"]
     time = theme.fixed("range_time", float(t[0]), float(t[-1]))
     count = len(history["name"])
@@ -54,8 +64,10 @@ def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ())
     return made
 
 
-def columns(seen: View, history: Columns) -> dict[str, Columns]:
+def columns(seen: Seen, history: Columns) -> dict[str, Columns]:
     """What a model gives the sources of a page."""
+    if isinstance(seen, PlacedView):
+        return placed_columns(seen, history)
     return {**seen.columns, "frame": frame(seen, history)}
 
 
@@ -109,7 +121,22 @@ def _log_axes(seen: View, history: Columns) -> dict[str, tuple[float, float]]:
     return shown
 
 
+def lay(page: Page, document: Document, session: Session) -> None:
+    """Put a page's panels, template and words into an empty document, for a live session."""
+    page.lay(document, template_name(session), variables(session, live=True))
+
+
+def template_name(session: Session) -> str:
+    """The template of a session's page."""
+    return f"{_layer(session)}.html"
+
+
 def variables(session: Session, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
-    checks = check_plots.CARDS[kind_of(session.prepared)]
-    return {**any_page.variables(session, live, "alone"), "several": bool(session.now.on_each), "checks": checks}
+    checks = () if session.now.model.named else check_plots.CARDS[kind_of(session.prepared)]
+    shown = any_page.variables(session, live, _layer(session))
+    return {**shown, "several": bool(session.now.on_each), "checks": checks}
+
+
+def _layer(session: Session) -> str:
+    return "placed" if session.now.model.named else "alone"

@@ -1,8 +1,8 @@
-"""The live page: a document that follows the desk and passes on what is clicked; a scene draws the sessions."""
+"""The live page: a document that follows the desk and passes on what is clicked."""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
 from bokeh.document import Document
 from bokeh.events import RangesUpdate
@@ -14,30 +14,14 @@ from study.explore.axis_scales import scales_of
 from study.explore.by_record import worst
 from study.explore.desk import Desk
 from study.explore.session import Session, Stage, on_record
-from study.explore.view import View, over_time, stretch, view
+from study.explore.view import over_time, stretch
 
 HELLO = "hello"  # what a page says when it is there
 RECORD = "record"  # what it asks for when another record is chosen
 
 
-class Scene(Protocol):
-    """What a document draws of the sessions of one kind."""
-
-    def lay(self, document: Document) -> None:
-        """Put panels, template and words into an empty document."""
-        ...
-
-    def show(self, session: Any) -> None:
-        """Draw another session."""
-        ...
-
-    def turn_to(self, record: str) -> None:
-        """Show another of several records, by its number."""
-        ...
-
-
-class AloneScene:
-    """A session of one coordinate in a document."""
+class Scene:
+    """A session in a document."""
 
     def __init__(self, session: Session, stores: Sequence[ColumnDataSource]) -> None:
         self.shown = session
@@ -47,8 +31,9 @@ class AloneScene:
 
     def lay(self, document: Document) -> None:
         """Put panels, template and words into an empty document."""
-        self.page.lay(document, html_page.TEMPLATE, html_page.variables(self.shown, live=True))
-        self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
+        html_page.lay(self.page, document, self.shown)
+        if "response" in self.page.panels:
+            self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
 
     def show(self, session: Session) -> None:
         """Draw another session."""
@@ -65,9 +50,9 @@ class AloneScene:
             self.record, self.span = records.index(record), None
             self.show(self.shown)
 
-    def _view(self) -> View:
+    def _view(self) -> html_page.Seen:
         stages = self.shown.stages
-        return view(stages[-1], len(stages) - 1, record=self.record)
+        return html_page.seen_of(stages[-1], len(stages) - 1, record=self.record)
 
     def _stage(self) -> Stage:
         return on_record(self.shown.now, self.record)
@@ -92,12 +77,12 @@ class AloneScene:
 class Watcher:
     """One page that follows the desk and passes on what is clicked: made ahead, and laid in the document of a visit."""
 
-    def __init__(self, desk: Desk[Any], scene: Callable[[Any, Sequence[ColumnDataSource]], Scene]) -> None:
+    def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.shown = desk.session
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
-        self.scene = scene(self.shown, [self.asked, self.state])
+        self.scene = Scene(self.shown, [self.asked, self.state])
         self.state.js_on_change("data", CustomJS(code="window.study.state()"))
 
     def lay(self, document: Document) -> None:

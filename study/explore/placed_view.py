@@ -20,8 +20,8 @@ from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats
 from study.explore.check_columns import by_itself
 from study.explore.page_units import Scale, in_text, length, power, rate
-from study.explore.placed_session import PlacedStage
 from study.explore.placed_words import placed_words
+from study.explore.session import Stage
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
@@ -39,7 +39,7 @@ class PlacedView:
     labels: dict[str, str]  # of axes, by the axis
 
 
-def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
+def placed_view(stage: Stage, step: int, live: bool = True) -> PlacedView:
     """The columns of a structure, by its number in the session; only a ``live`` page can act."""
     comparison = stage.comparison
     drawn = sketch_of(comparison) if stage.diagnosis is None else sketch_of_diagnosis(stage.diagnosis)
@@ -225,7 +225,7 @@ def _stiffness(comparison: Comparison, labels: Mapping[frozenset[str], str]) -> 
     return _joined(parts(), ("f", "measured", "low", "high", "model")), in_text(scale.unit)
 
 
-def _constancy(stage: PlacedStage) -> Columns:
+def _constancy(stage: Stage) -> Columns:
     """A(f) of each candidate with 95 % intervals."""
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:

@@ -14,7 +14,7 @@ from study.equations.linear_part import Modes
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.explore.page_units import in_percent, in_sentence, in_text, with_error
-from study.explore.placed_session import PlacedStage
+from study.explore.session import Stage
 from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch, svg
@@ -24,7 +24,7 @@ from study.support.numbers import percent
 SHOWN, TRIED = 12, 8  # candidates; those named of one place
 
 
-def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> dict[str, Any]:
+def placed_words(stage: Stage, drawn: Sketch, step: int, live: bool) -> dict[str, Any]:
     """Every fragment of a structure, as columns ``place`` and ``html``."""
     comparison = stage.comparison
     chosen = max(drawn.links, key=lambda link: link.share).place
@@ -56,7 +56,7 @@ def _figures(comparison: Comparison) -> str:
     return "".join(figure(*cell) for cell in cells)
 
 
-def _hint(stage: PlacedStage) -> str:
+def _hint(stage: Stage) -> str:
     if stage.diagnosis is not None and stage.diagnosis.verdict in VERDICTS and stage.diagnosis.candidates:
         first = stage.diagnosis.candidates[0]
         if gives(first):
@@ -64,14 +64,14 @@ def _hint(stage: PlacedStage) -> str:
     return "A connection glows with the share of what is left that general functions of its own motion explain."
 
 
-def _verdict(stage: PlacedStage, live: bool) -> str:
+def _verdict(stage: Stage, live: bool) -> str:
     if stage.diagnosis is None:
         return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
     head = VERDICTS.get(stage.diagnosis.verdict, UNKNOWN)
     return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(in_sentence(stage.said))}</p>"
 
 
-def _places(stage: PlacedStage, drawn: Sketch) -> str:
+def _places(stage: Stage, drawn: Sketch) -> str:
     """What is known of each place, one block each: the script shows that of the selected one."""
     comparison = stage.comparison
     shares = {place.path: share for place, share in comparison.missing.aligned}
@@ -108,7 +108,7 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def _candidates(stage: PlacedStage, live: bool) -> str:
+def _candidates(stage: Stage, live: bool) -> str:
     if stage.diagnosis is None:
         return ""
     offered = [r for r in stage.diagnosis.candidates if gives(r)][:SHOWN]
@@ -117,7 +117,7 @@ def _candidates(stage: PlacedStage, live: bool) -> str:
     return f"<ol>{HEAD}{''.join(_row(i, r, stage, live) for i, r in enumerate(offered))}{rest}</ol>"
 
 
-def _row(number_: int, row: Ranked, stage: PlacedStage, live: bool) -> str:
+def _row(number_: int, row: Ranked, stage: Stage, live: bool) -> str:
     name, where = escape(in_words(row.term.name)), row.entry.place
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     ties = next((r.tied_with for r in (stage.diagnosis.candidates if stage.diagnosis else ())), ())
@@ -137,7 +137,7 @@ def _tied(row: Ranked) -> str:
     return f"cannot be told from {', '.join(in_words(n) for n in row.tied_with)}"
 
 
-def _drawn_label(place: Place, stage: PlacedStage) -> str:
+def _drawn_label(place: Place, stage: Stage) -> str:
     """The label under which the sketch has a place, whichever end comes first."""
     from study.equations.linear_part import connections
 
@@ -162,10 +162,10 @@ def _detail(row: Ranked) -> str:
     )
 
 
-def _coefficients(stage: PlacedStage, live: bool) -> str:
+def _coefficients(stage: Stage, live: bool) -> str:
     """A row each; that of a term's first coefficient says whether the term is not needed."""
     head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
-    waiting = {f"{n.entry.keys[0]}": n for n in stage.unneeded}
+    waiting = {f"{n.entry.keys[0]}": n for n in stage.unneeded or ()}
     entries = {key: entry for entry in stage.model.terms for key in entry.keys}
     rows: list[str] = []
     for c in stage.comparison.coefficients:
@@ -189,7 +189,7 @@ def _coefficient(c: Coefficient, drop: str, live: bool) -> str:
     )
 
 
-def _modes(stage: PlacedStage) -> str:
+def _modes(stage: Stage) -> str:
     """Modes of the underlying linear system, and with the first candidate where an effect is missing."""
     before, after = stage.comparison.modes, stage.diagnosis.modes_after if stage.diagnosis is not None else None
     sets = [("as fitted", before)] + ([("with the first candidate", after)] if after is not None else [])

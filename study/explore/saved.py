@@ -15,7 +15,6 @@ from study.explore.any_page import ROOT, Page, history_columns, template
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
 from study.explore.session import Session, begin_with
-from study.explore.view import view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
@@ -24,13 +23,13 @@ def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first, where that misses most."""
     history, first = history_columns(session), (len(session.stages) - 1, worst(session.now.on_each))
     views = {
-        (number, record): view(stage, number, live=False, record=record)
+        (number, record): html_page.seen_of(stage, number, live=False, record=record)
         for number, stage in enumerate(session.stages)
         for record in range(max(len(stage.on_each), 1))
     }
     stores = stored({place: html_page.columns(seen, history) for place, seen in views.items()}, history)
     made = html_page.build(views[first], history, stores)
-    return as_file(made, html_page.TEMPLATE, html_page.variables(session, live=False))
+    return as_file(made, html_page.template_name(session), html_page.variables(session, live=False))
 
 
 def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Columns) -> list[ColumnDataSource]:

@@ -8,8 +8,6 @@ from study.compare.comparison_report import as_json, comparison_document, tables
 from study.compare.history_picture import history_files as history_pictures
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.equations import model_file
-from study.equations.model import Model
-from study.explore.any_session import AnySession
 from study.explore.saved import saved
 from study.explore.session import Session, Stage
 
@@ -30,16 +28,13 @@ def files(
         for term in [t.name for t in model.terms if set(t.term.symbols) & set(one.differences)]:
             model = model.without_term(term)
     shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
-    return {**beside(session, name, text, model), PAGE: saved(session), **shown}
-
-
-def beside(session: AnySession, name: str, text: str, model: Model) -> dict[str, bytes]:
-    """The model file, with the comments of its text, and the history with its picture."""
     steps = session.steps
     return {
         name: model_file.revised(text, name, model).encode(),
         history.name_for(name): history.as_bytes(steps),
         **history_pictures(steps, name.rpartition(".")[0] or name),
+        PAGE: saved(session),
+        **shown,
     }
 
 
@@ -54,7 +49,7 @@ def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:
     for comparison in each:
         prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
         contents |= {prefix + name: content for name, content in comparison_pictures(comparison).items()}
-    contents |= level_pictures(levels, now.comparison.record.units.get("force", "N"))
+    contents |= level_pictures(levels, now.comparison.record.force_and_length[0])
     if now.diagnosis is not None:
         contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
     return contents

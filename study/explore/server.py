@@ -16,7 +16,7 @@ from tornado.ioloop import IOLoop
 
 from study.explore.desk import Desk
 from study.explore.guard import GuardedTornado, one_line_each
-from study.explore.live import AloneScene, Scene, Watcher
+from study.explore.live import Watcher
 from study.support.errors import StudyError
 
 HOST = "127.0.0.1"
@@ -26,23 +26,20 @@ AGAIN = 5.0  # seconds after a visit in which its page is drawn, before one is m
 DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
-def serve(
-    desk: Desk[Any], port: int | None, ready: Callable[[str], None], scene: Callable[..., Scene] = AloneScene
-) -> None:
+def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
     """Serve a desk until interrupted, and call ``ready`` with the address once it can be opened.
 
-    ``scene`` draws a session of the desk's kind. A port of zero takes any that is free, None the usual one or, if that
-    is taken, any.
+    A port of zero takes any that is free, None the usual one or, if that is taken, any.
     """
     ahead = ThreadPoolExecutor(1, "page")
     made: list[Future[Watcher]] = []  # pages that wait for a visit: one is made before the browser has opened
 
     def make() -> None:
         if not made:
-            made.append(ahead.submit(Watcher, desk, scene))
+            made.append(ahead.submit(Watcher, desk))
 
     def show(document: Document) -> None:
-        page = made.pop().result() if made else Watcher(desk, scene)
+        page = made.pop().result() if made else Watcher(desk)
         page.lay(document)
         loop.call_later(AGAIN, make)
 

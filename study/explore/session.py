@@ -1,9 +1,10 @@
 """The state of a session: the models tried so far and what was found of each. Nothing here knows of a browser.
 
-Every function gives a new session; what was found of a model stays with its stage, so that undoing computes nothing.
+Terms and candidates go by their full name: the effect, and the place where that has a name. Every function gives a new
+session; what was found of a model stays with its stage, so that undoing computes nothing.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,7 +16,7 @@ from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
-from study.diagnose.candidates import FittedCandidate
+from study.diagnose.candidates import FittedCandidate, Progress
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
@@ -25,7 +26,6 @@ from study.diagnose.verdict import Diagnosis, search_base
 from study.equations import formulas
 from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, Term, custom
-from study.explore.any_session import chosen, held, holding
 from study.explore.by_record import ByRecord, Several, by_record
 from study.records.prepared import Prepared
 from study.records.record_layout import records_judged
@@ -33,7 +33,6 @@ from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
-Progress = Callable[[str], None]
 SHOWN = 8  # candidates
 NONE = Several()
 
@@ -44,11 +43,11 @@ class Stage:
 
     model: Model  # values that it gives are held
     label: str  # what was done to arrive at it
-    added: str | None  # the term that is new in it
+    added: str | None  # the term that is new in it, by effect and place
     comparison: Comparison
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
-    # what a candidate would leave on each record, by its name
+    # what a candidate would leave on each record, by its name; of a single mass, whose page shows it
     would: Mapping[str, tuple[MissingForce, ...]] = field(default_factory=dict[str, tuple[MissingForce, ...]])
     dropped: str | None = None  # the term that was taken out of the model before
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
@@ -95,11 +94,9 @@ def joined(earlier: Sequence[Step], own: Sequence[Step]) -> list[Step]:
     return [*earlier, *own[1 if known else 0 :]]
 
 
-def begin(
-    model: Model, prepared: Prepared, *, earlier: Sequence[Step] = (), progress: Progress | None = None
-) -> Session:
+def begin(model: Model, prepared: Prepared, *, earlier: Sequence[Step] = ()) -> Session:
     """A session with the model as given, on the samples that the record's motion asks for."""
-    return begin_with(compare(model, without_spare_samples(prepared), progress=progress), earlier=earlier)
+    return begin_with(compare(model, without_spare_samples(prepared)), earlier=earlier)
 
 
 def begin_with(
@@ -137,9 +134,17 @@ def climbed(session: Session, comparison: Comparison, label: str, added: str | N
     return replace(session, stages=(*session.stages, stage_of(comparison, label, added)))
 
 
+def undone(session: Session) -> Session:
+    """The session before its last change; the model as given stays."""
+    return replace(session, stages=session.stages[:-1]) if len(session.stages) > 1 else session
+
+
 def candidate(session: Session, name: str) -> Ranked:
     """The candidate of this name in the present diagnosis, which must have one."""
-    return chosen(session.now.diagnosis.candidates if session.now.diagnosis is not None else (), name)
+    for row in session.now.diagnosis.candidates if session.now.diagnosis is not None else ():
+        if row.name == name:
+            return row
+    raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
 
 
 def with_added(session: Session, name: str) -> Session:
@@ -156,7 +161,8 @@ def dropped(session: Session, name: str) -> Session:
     StudyError
         If it is not in the model or cannot be left out.
     """
-    comparison = dropping.compared_without(session.now.comparison, name)
+    now = session.now
+    comparison = dropping.compared_without(now.comparison, dropping.term_at(now.model, name))
     return replace(session, stages=(*session.stages, stage_of(comparison, f"- {name}", None, dropped=name)))
 
 
@@ -191,23 +197,21 @@ def weighed(session: Session) -> Session:
 
 def with_held(session: Session, key: str, hold: bool) -> Session:
     """The session with a value held where it stands, or freed; it must not be so already."""
-    model, now = holding(session, key, hold), session.now.values
+    model, known, done = session.now.model, session.now.values, "held" if hold else "free"
+    expect(key in model.values, f"{key!r} is no value of this model; it has {', '.join(model.values)}")
+    expect((model.values[key] is None) == hold, f"{key} is {done} already")
     alone = key == "m" and len(model.terms) == 1
     expect(hold or not alone, "m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
-    return climbed(session, compare(model, session.prepared, start=now), held(key, hold), None)
+    changed = model.with_values({**model.values, key: known[key] if hold else None})
+    return climbed(session, compare(changed, session.prepared, start=known), f"{key} {done}", None)
 
 
-def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Stage, Diagnosis]:
+def examined(session: Session, progress: Progress | None = None) -> tuple[Stage, Diagnosis]:
     """The present stage with what is missing and what is not needed, in words too, and what each candidate would leave.
 
     And the diagnosis.
     """
-
-    def report(done: int, _: int) -> None:
-        if progress is not None:
-            progress(done)
-
-    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=report)
+    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
     now = weighed(session).now
     said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
@@ -216,7 +220,7 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
 def _foreseen(stage: Stage) -> Stage:
     """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
     would = dict(stage.would)
-    for row in stage.shown:
+    for row in () if stage.model.named else stage.shown:
         if row.name not in would:
             would[row.name] = tuple(_lacking_with(row, c) for c in stage.on_each or (stage.comparison,))
     return replace(stage, would=would)
@@ -269,7 +273,7 @@ def _attempted(term: Term, session: Session) -> FittedCandidate | None:
 def tried(session: Session, text: str) -> Session:
     """The session with a formula of the user's among the candidates, fitted and ranked with them.
 
-    The verdict is left as it was; :func:`examined` weighs it again.
+    The verdict is left as it was; :func:`examined` weighs it again, and tries the formula at all places of a structure.
 
     Raises
     ------
@@ -277,8 +281,10 @@ def tried(session: Session, text: str) -> Session:
         If the formula is refused, or has no finite response on this record.
     """
     now = session.now
-    taken = {t.name for t in (*session.own, *now.model.terms)}
+    taken = {t.name for t in session.own} | {t.term.name for t in now.model.terms}
     term = own_term(text, taken, session.prepared.record.extra)
+    if now.model.named:
+        return replace(session, own=(*session.own, term))
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
     known = [FittedCandidate(r.entry, r.fit, r.prediction) for r in now.diagnosis.candidates]

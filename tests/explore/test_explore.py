@@ -17,7 +17,7 @@ from study.diagnose.adding import added
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import any_page, any_session, decimate, page_units, saved_files, view, words
+from study.explore import any_page, decimate, page_units, saved_files, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.saved import saved
@@ -88,8 +88,8 @@ def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(a
     assert before.prediction.error > 1.4 * before.prediction.floor
     assert after.prediction.error == pytest.approx(after.prediction.floor, rel=0.1)
     assert [s["added"] for s in grown.steps] == [None, "quadratic_damping"]
-    assert any_session.undone(grown) == asked
-    assert any_session.undone(asked) is asked
+    assert sessions.undone(grown) == asked
+    assert sessions.undone(asked) is asked
     with pytest.raises(StudyError, match="no candidate of the present model"):
         sessions.with_added(grown, "quadratic_damping")
 
@@ -148,7 +148,7 @@ def test_a_dropped_term_is_gone_and_undoing_brings_it_back(grown, superfluous):
         "as given", "+ quadratic_damping", "+ quadratic_stiffness", "- quadratic_stiffness"
     ]  # fmt: skip
     assert any_page.history_columns(after)["name"][-1] == "3 - quadratic stiffness"
-    assert any_session.undone(after) == superfluous
+    assert sessions.undone(after) == superfluous
     model = model_file.format_model(grown.stages[0].model.with_term(get("quadratic_stiffness")))
     contents = files(after, "rig.yaml", f"# hall 3\n{model}")
     assert "quadratic_stiffness" not in contents["rig.yaml"].decode()

@@ -10,12 +10,10 @@ import pytest
 from study.compare import history
 from study.compare.comparison import compare
 from study.equations import model_file
-from study.explore import any_session
-from study.explore import placed_session as sessions
+from study.explore import session as sessions
 from study.explore.desk import Desk
-from study.explore.placed_page import PLACED, structure_files
 from study.explore.placed_view import placed_view
-from study.explore.saved_files import PAGE
+from study.explore.saved_files import PAGE, files
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
@@ -27,17 +25,17 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 def begun(hall):
     model = model_file.read_model(hall / "frame.yaml")
     prepared = prepare_record(read_record(hall / "frame.csv", roles=model.roles))
-    return sessions.begin_placed(compare(model, prepared))
+    return sessions.begin_with(compare(model, prepared))
 
 
 @pytest.fixture(scope="module")
 def asked(begun):
-    return sessions.with_stage(begun, sessions.examined(begun))
+    return sessions.with_stage(begun, sessions.examined(begun)[0])
 
 
 @pytest.fixture(scope="module")
 def grown(asked):
-    return sessions.with_placed(asked, CUBIC)
+    return sessions.with_added(asked, CUBIC)
 
 
 @pytest.mark.long
@@ -47,14 +45,14 @@ def test_what_is_added_where_it_is_missing_lets_the_error_fall_and_undo_brings_i
     assert after.error == pytest.approx(after.floor, rel=0.1)
     assert after.error < 0.7 * before.error
     assert [s["added"] for s in grown.steps] == [None, CUBIC]
-    assert any_session.undone(grown).stages == asked.stages
-    assert any_session.undone(asked) is asked
+    assert sessions.undone(grown).stages == asked.stages
+    assert sessions.undone(asked) is asked
     with pytest.raises(StudyError, match="no candidate of the present model"):
-        sessions.with_placed(grown, CUBIC)
+        sessions.with_added(grown, CUBIC)
 
 
 def test_a_term_at_a_place_is_dropped_and_a_value_held(begun, grown):
-    after = sessions.without_placed(grown, CUBIC)
+    after = sessions.dropped(grown, CUBIC)
     assert after.now.model == begun.now.model
     error = begun.now.comparison.prediction.error
     assert after.now.comparison.prediction.error == pytest.approx(error, rel=1e-3)
@@ -62,7 +60,7 @@ def test_a_term_at_a_place_is_dropped_and_a_value_held(begun, grown):
     held = sessions.with_held(grown, "m[floor1]", True)
     assert held.now.model.values["m[floor1]"] == grown.now.values["m[floor1]"]
     for change, said in (
-        (lambda: sessions.without_placed(begun, "hysteresis"), "not in the model"),
+        (lambda: sessions.dropped(begun, "hysteresis"), "not in the model"),
         (lambda: sessions.with_held(held, "m[floor1]", True), "held already"),
         (lambda: sessions.with_held(held, "m[floor9]", True), "no value of this model"),
         (lambda: sessions.tried(begun, "__import__('os')"), "__import__"),
@@ -110,19 +108,19 @@ def test_words_name_effect_and_place_and_only_a_live_page_has_buttons(asked):
 
 @pytest.mark.long
 def test_what_is_saved_holds_model_history_tables_pictures_and_the_page(hall, grown, tmp_path):
-    made = structure_files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)
+    made = files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)
     assert {"frame.yaml", "frame.history.json", "comparison.json", PAGE, "structure.png", "history.png"} <= set(made)
     assert made["frame.yaml"].startswith(b"# hall 3\n")
     (tmp_path / "frame.yaml").write_bytes(made["frame.yaml"])
     assert model_file.read_model(tmp_path / "frame.yaml").values == pytest.approx(grown.now.values, rel=1e-9)
     assert json.loads(made["frame.history.json"])["steps"][1]["added"] == CUBIC
     assert b"http://" not in re.sub(rb"http://www\.w3\.org[^\"' ]*", b"", made[PAGE][:4000])
-    assert made[PAGE] == structure_files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)[PAGE]
+    assert made[PAGE] == files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)[PAGE]
 
 
 @pytest.mark.long
 def test_the_desk_takes_a_structure_as_it_takes_one_coordinate(asked, hall, tmp_path):
-    desk = Desk(asked, hall / "frame.yaml", (hall / "frame.yaml").read_text(), tmp_path / "out", deeds=PLACED)
+    desk = Desk(asked, hall / "frame.yaml", (hall / "frame.yaml").read_text(), tmp_path / "out")
     done = threading.Event()
     desk.watch(desk, lambda: None if desk.state.busy else done.set())
 

@@ -19,10 +19,9 @@ from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
 from study.explore import decimate, saved_files, view
 from study.explore import session as sessions
-from study.explore.any_session import undone
 from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
-from study.explore.live import AloneScene, Watcher
+from study.explore.live import Watcher
 from study.explore.saved import saved
 from study.records.excitation import Excitation, force
 from study.records.record import ALONE, MOTIONS, Record, Sensor
@@ -156,8 +155,8 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
 
 
 def test_a_page_that_was_made_ahead_of_its_visit_shows_what_was_done_since(grown, tmp_path):
-    desk = Desk(undone(grown), tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
-    watcher, document = Watcher(desk, AloneScene), Document()
+    desk = Desk(sessions.undone(grown), tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
+    watcher, document = Watcher(desk), Document()
     desk.session = grown
     watcher.lay(document)
     said, known = document.template_variables["said"], view.view(grown.now, 1).columns["words"]
@@ -169,10 +168,9 @@ def test_a_page_that_was_made_ahead_of_its_visit_shows_what_was_done_since(grown
 
 def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
     desk = Desk(grown, tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
-    watcher = Watcher(desk, AloneScene)
+    watcher = Watcher(desk)
     watcher.lay(Document())
     scene = watcher.scene
-    assert isinstance(scene, AloneScene)
     for place, name in ((1, "high"), (0, "low")):
         watcher.asked.data = {"act": ["record"], "name": [str(place)], "count": [place]}
         source = scene.page.sources["words"].data
