@@ -59,10 +59,10 @@ class Page:
         said = dict(zip(words["place"], words["html"], strict=True))
         return {"said": said, "heights": {name: panel.height for name, panel in self.panels.items()}}
 
-    def lay(self, document: Document, name: str, values: Mapping[str, Any]) -> None:
-        """Put panels, the template of this name and words into an empty document."""
+    def lay(self, document: Document, values: Mapping[str, Any]) -> None:
+        """Put panels, template and words into an empty document."""
         document.add_root(self.root(values["diagnosed"]))
-        document.title, document.template = values["title"], template(name)
+        document.title, document.template = values["title"], template()
         document.template_variables.update({**values, **self.given})
         self.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
 
@@ -144,17 +144,22 @@ def even_ticks(low: float, high: float) -> list[float]:
 
 
 @cache
-def template(name: str) -> Template:
-    """A page's template, which extends that of all pages."""
-    return Environment(autoescape=False, loader=FunctionLoader(_text)).get_template(name)
+def template() -> Template:
+    """The template of all pages."""
+    return Environment(autoescape=False, loader=FunctionLoader(_text)).get_template("page.html")
 
 
-def variables(session: Session, live: bool, *layers: str) -> dict[str, Any]:
-    """What the templates need beside the panels; style and script are those of all pages and of ``layers`` on them."""
+def variables(session: Session, live: bool) -> dict[str, Any]:
+    """What the template needs beside the panels.
+
+    Style and script are those of all pages, and of a layer on them for coordinates that have names or one that has not.
+    """
     record, model = session.prepared.record.name, session.now.model.name
-    style, script = ("".join(_text(f"{n}.{kind}") for n in ("page", *layers)) for kind in ("css", "js"))
+    layer = "placed" if session.now.model.named else "alone"
+    style, script = ("".join(_text(f"{n}.{kind}") for n in ("page", layer)) for kind in ("css", "js"))
     return {
-        "record": record, "model": model, "title": f"{record}: {model}", "live": live, "style": style, "script": script,
+        "record": record, "model": model, "title": f"{record}: {model}", "live": live,
+        "layer": layer, "style": style, "script": script,
         "steps": [f"{i} {words.in_words(stage.label)}" for i, stage in enumerate(session.stages)],
         "diagnosed": live or any(stage.diagnosis is not None for stage in session.stages),
     }  # fmt: skip

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import any_page, check_plots, plots, theme
@@ -121,22 +120,7 @@ def _log_axes(seen: View, history: Columns) -> dict[str, tuple[float, float]]:
     return shown
 
 
-def lay(page: Page, document: Document, session: Session) -> None:
-    """Put a page's panels, template and words into an empty document, for a live session."""
-    page.lay(document, template_name(session), variables(session, live=True))
-
-
-def template_name(session: Session) -> str:
-    """The template of a session's page."""
-    return f"{_layer(session)}.html"
-
-
 def variables(session: Session, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
     checks = () if session.now.model.named else check_plots.CARDS[kind_of(session.prepared)]
-    shown = any_page.variables(session, live, _layer(session))
-    return {**shown, "several": bool(session.now.on_each), "checks": checks}
-
-
-def _layer(session: Session) -> str:
-    return "placed" if session.now.model.named else "alone"
+    return {**any_page.variables(session, live), "several": bool(session.now.on_each), "checks": checks}

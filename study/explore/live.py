@@ -31,7 +31,7 @@ class Scene:
 
     def lay(self, document: Document) -> None:
         """Put panels, template and words into an empty document."""
-        html_page.lay(self.page, document, self.shown)
+        self.page.lay(document, html_page.variables(self.shown, live=True))
         if "response" in self.page.panels:
             self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
 

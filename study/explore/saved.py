@@ -29,7 +29,7 @@ def saved(session: Session) -> bytes:
     }
     stores = stored({place: html_page.columns(seen, history) for place, seen in views.items()}, history)
     made = html_page.build(views[first], history, stores)
-    return as_file(made, html_page.template_name(session), html_page.variables(session, live=False))
+    return as_file(made, html_page.variables(session, live=False))
 
 
 def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Columns) -> list[ColumnDataSource]:
@@ -42,8 +42,8 @@ def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Co
     return stores
 
 
-def as_file(made: Page, name: str, values: Mapping[str, Any]) -> bytes:
-    """A page as a file that needs no server; each panel has its place in the template of this name by its own."""
+def as_file(made: Page, values: Mapping[str, Any]) -> bytes:
+    """A page as a file that needs no server; each panel has its place in the template by its own name."""
     document, root = Document(), made.root(values["diagnosed"])
     document.add_root(root)
     document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
@@ -51,7 +51,7 @@ def as_file(made: Page, name: str, values: Mapping[str, Any]) -> bytes:
     place = SimpleNamespace(id=ids[root.id], elementid="study-root")
     items = [{"docid": "study", "roots": {place.id: place.elementid}, "root_ids": [place.id]}]
     script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
-    text = template(name).render(
+    text = template().render(
         **values, **made.given, roots={ROOT: place}, plot_script=f"<script>{script}</script>",
         bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
     )  # fmt: skip

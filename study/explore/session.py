@@ -33,7 +33,7 @@ from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
-SHOWN = 8  # candidates
+SHOWN, SHOWN_AT_PLACES = 8, 12  # candidates
 NONE = Several()
 
 
@@ -58,7 +58,8 @@ class Stage:
     def shown(self) -> tuple[Ranked, ...]:
         """The candidates that a page lists: the best, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
-        return (*rows[:SHOWN], *(r for r in rows[SHOWN:] if r.name not in LIBRARY))
+        best = SHOWN_AT_PLACES if self.model.named else SHOWN
+        return (*rows[:best], *(r for r in rows[best:] if r.term.name not in LIBRARY))
 
     @property
     def values(self) -> dict[str, float]:

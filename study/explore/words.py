@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from study.compare.force_map import FEWEST, surface
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.equations.linear_part import connections
+from study.equations.model import Model
+from study.equations.place import Place, place_in_words
 from study.equations.terms import LIBRARY
 from study.explore.axis_scales import within
 from study.explore.page_units import Scale, in_percent, in_sentence, in_text, length, mass, number, rate, with_error
@@ -41,23 +44,30 @@ ONLY_NOISE = "What is left is noise: there is no missing force to show over disp
 
 
 def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
-    """Every fragment of a model, as columns ``place`` and ``html``."""
-    comparison, diagnosed = stage.comparison, live or stage.diagnosis is not None  # a live page diagnoses by itself
-    fragments = {
+    """Every fragment of the model of a single mass, as columns ``place`` and ``html``."""
+    comparison = stage.comparison
+    fragments = shared_words(stage, rows, step, live) | {
         "figures": _figures(comparison),
+        "equation": equation(stage),
+        "equation-values": equation(stage, values=True),
+        "only-noise": ONLY_NOISE if comparison.prediction.of(0).noise.alone else "",
+        "plane-hint": hint(comparison),
+        "force-unit": escape(in_text(force_unit)),
+    }
+    return {"place": list(fragments), "html": list(fragments.values())}
+
+
+def shared_words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool) -> dict[str, str]:
+    """The fragments that every page has, whether its coordinates have names or not."""
+    comparison, diagnosed = stage.comparison, live or stage.diagnosis is not None  # a live page diagnoses by itself
+    return {
         "says": escape(in_sentence(comparison_in_words(comparison, diagnosed))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(stage, live),
-        "equation": equation(stage),
-        "equation-values": equation(stage, values=True),
         "notes": escape(in_sentence("; ".join(comparison.notes))),
-        "only-noise": ONLY_NOISE if comparison.prediction.of(0).noise.alone else "",
-        "plane-hint": hint(comparison),
         "step": escape(name(stage, step)),
-        "force-unit": escape(in_text(force_unit)),
     }
-    return {"place": list(fragments), "html": list(fragments.values())}
 
 
 def hint(comparison: Comparison) -> str:
@@ -129,54 +139,52 @@ def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     left = [in_words(row.name) for row in stage.diagnosis.candidates if row.name not in shown]
     more = len(left)
     others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
-    rest = f"<li class='more'>{others}: {escape(', '.join(left))}</li>" if more > 0 else ""
+    if stage.model.named:  # too many to name
+        more = stage.diagnosis.asked - len(offered)
+        others, left = f"{more} more effects and places explain less, or no more than chance would", []
+    rest = f"<li class='more'>{others}{escape(': ' + ', '.join(left)) if left else ''}</li>" if more > 0 else ""
     return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
 
 
-class Explains(Protocol):
-    """A candidate, of one coordinate or at a place."""
-
-    @property
-    def gain(self) -> Gain:
-        """What it explains of the held-out residual."""
-        ...
-
-    @property
-    def p_value(self) -> float:
-        """Of what it explains, with the number of candidates accounted for."""
-        ...
-
-
-def gives(row: Explains) -> bool:
+def gives(row: Ranked) -> bool:
     """Whether a candidate explains more than chance would: one that does not is not offered."""
     return row.gain.explained > 0.0 and row.p_value < ALPHA
 
 
 def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
     """Whether a candidate is offered: the user's own, and one of what is missing that explains more than chance."""
-    return row.name not in LIBRARY or (diagnosis.verdict != NOTHING and gives(row))
+    return row.term.name not in LIBRARY or (diagnosis.verdict != NOTHING and gives(row))
 
 
-def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
-    units = stage.comparison.record.units
-    unit = row.term.unit(row.term.symbols[0], units.get("force", "N"), units.get("displacement", "m"))
+def _row(number: int, row: Ranked, stage: Stage, live: bool) -> str:
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} %"
-    formula = escape(in_text(row.term.formula))
-    words = escape(in_words(row.name))
+    words, formula = escape(in_words(row.term.name)), escape(in_text(row.term.formula))
     meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
-    size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {in_text(unit)}"
-    found = f" Found in {escape(row.term.cause)}." if row.name in LIBRARY else ""
+    size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {in_text(row.unit)}"
+    found = f" Found in {escape(row.term.cause)}." if row.term.name in LIBRARY else ""
+    doubt = f" As fitted it is no physical effect: {escape(row.unphysical)}." if row.unphysical else ""
+    at, where, said, click = "", "", "", "; a click pins it beside another"
+    if stage.model.named:
+        said, click = f" {escape(place_in_words(row.entry.place))}", ""
+        where = f" <i>{escape(row.entry.place.label)}</i>"
+        at = f" data-row='{escape(row.name)}' data-at='{escape(_sketched(row.entry.place, stage.model))}'"
     detail = (
-        f"<b>{words}</b> <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
+        f"<b>{words}</b>{said} <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
         f"{100.0 * row.gain.error:.1f} %, error with it {in_percent(row.response_error)}. {escape(meaning)}.{found}"
+        f"{doubt}"
     )
     return (
-        f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "
-        f"aria-label='{words}, explains {explained}'><span class='rank'>{_rank(place, row, stage)}</span>"
-        f"<span class='name' title='{words}; a click pins it beside another'><b>{words}</b></span>{_ties(row)}"
+        f"<li class='candidate'{at} data-candidate='{number}' data-label='{escape(_label(row, row.unit))}' "
+        f"tabindex='0' aria-label='{words}{said}, explains {explained}'><span class='rank'>{_rank(number, row, stage)}"
+        f"</span><span class='name' title='{words}{click}'><b>{words}</b>{where}</span>{_ties(row)}"
         f"{bar(row.gain)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
     )
+
+
+def _sketched(place: Place, model: Model) -> str:
+    """The label under which the sketch has a place, whichever end comes first."""
+    return next((known.label for known in connections(model) if known.path == place.path), place.label)
 
 
 def _label(row: Ranked, unit: str) -> str:
@@ -215,9 +223,10 @@ def bar(gain: Gain) -> str:
 def _coefficients(stage: Stage, live: bool) -> str:
     """A row each; that of a term's first coefficient says whether the term is not needed."""
     head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
-    waiting = {n.name: n for n in stage.unneeded or ()}
-    rows = [_coefficient(c, live, waiting.pop(c.term, None)) for c in stage.comparison.coefficients]
-    return f"<table>{head}{''.join(rows)}{_modal(stage.comparison)}</table>"
+    unneeded = {n.entry.keys[0]: n for n in stage.unneeded or ()}
+    rows = [_coefficient(c, live, unneeded.get(c.key)) for c in stage.comparison.coefficients]
+    modal = "" if stage.model.named else _modal(stage.comparison)  # the modes of a structure are a table of their own
+    return f"<table>{head}{''.join(rows)}{modal}</table>"
 
 
 def _modal(comparison: Comparison) -> str:
@@ -257,9 +266,11 @@ def _coefficient(coefficient: Coefficient, live: bool, unneeded: Needless | None
     size, half = in_table(coefficient.value / shown.factor, coefficient.error, shown.factor)
     act, label = ("free", "Free") if coefficient.held else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(coefficient.key)}'>{label}</button>" if live else ""
+    symbol, at = coefficient.key.partition("[")[0].rpartition(".")[2], coefficient.place.label
+    where = f" <i>{escape(at)}</i>" if at else ""
     return (
-        f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(coefficient.key.rpartition('.')[2])}</i></td>"
-        f"<td>{escape(in_words(coefficient.term))}{_unneeded(unneeded, live)}</td>"
+        f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(symbol)}</i></td>"
+        f"<td>{escape(in_words(coefficient.term))}{where}{_unneeded(unneeded, live)}</td>"
         f"<td class='number'>{size}</td><td>{half}</td>"
         f"<td>{escape(in_text(shown.unit))}</td><td>{button}</td></tr>"
     )
