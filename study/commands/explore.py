@@ -58,9 +58,10 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     from study.faults.accounting import Accounted
     from study.support.errors import expect
 
-    more = arguments.records[1:] or arguments.each_record
-    sentence = f"{more and more[0]}: the page of a structure shows one record; expected no more"
-    expect(not (more and model.named), sentence)
+    expect(
+        not (arguments.each_record and model.named),
+        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a session",
+    )
     structures.refuse_modal(model, "explore")
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)

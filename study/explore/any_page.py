@@ -99,6 +99,12 @@ def frame(rows: Sequence[Row], frequencies: tuple[float, float], ends: Mapping[s
     return dict(zip(("model", "property", "value"), map(list, zip(*everything, strict=True)), strict=True))
 
 
+def time_rows(first: float, last: float) -> list[Row]:
+    """The range of time in seconds: where it stands, and where the tool that resets it puts it."""
+    ends = {"start": first, "reset_start": first, "end": last, "reset_end": last}
+    return [("range_time", name, value) for name, value in ends.items()]
+
+
 def history_ends(history: Columns) -> tuple[float, float]:
     """Ends of the axis of the history in per cent."""
     tried = [x for name in ("response", "force", "floor") for x in history[name] if x > 0.0]

@@ -27,13 +27,12 @@ KINDS = {
     "response": "time", "difference": "time", "force": "band", "coherence": "band", "spectrum": "band",
     "against_u": "u", "against_v": "v",
 }  # fmt: skip
-BEGINS, ENDS = ("start", "reset_start"), ("end", "reset_end")  # of a range, the second for the tool that resets it
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
 def seen_of(stage: Stage, step: int, live: bool = True, record: int = 0) -> Seen:
     """What is drawn of a model, by its number in the session, on one of its records; only a ``live`` page can act."""
-    return placed_view(stage, step, live) if stage.model.named else view(stage, step, live, record)
+    return placed_view(stage, step, live, record) if stage.model.named else view(stage, step, live, record)
 
 
 def build(seen: Seen, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
@@ -98,7 +97,7 @@ def frame(seen: View, history: Columns) -> Columns:
         *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
         *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
         ("mapper", "low", -largest), ("mapper", "high", largest),
-        *(("range_time", name, float(t[0])) for name in BEGINS), *(("range_time", name, float(t[-1])) for name in ENDS),
+        *any_page.time_rows(float(t[0]), float(t[-1])),
         ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
     ]  # fmt: skip
     return any_page.frame(rows, _frequencies(seen), _log_axes(seen, history))

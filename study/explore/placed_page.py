@@ -7,7 +7,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource
 
 from study.explore import check_plots, placed_panels, plots, theme
-from study.explore.any_page import EMPTY, Page, frame, history_ends, history_height, page_of
+from study.explore.any_page import EMPTY, Page, frame, history_ends, history_height, page_of, time_rows
 from study.explore.axis_scales import Columns
 from study.explore.placed_view import PlacedView
 
@@ -40,7 +40,9 @@ def placed_page(seen: PlacedView, lasting: Columns, stores: Sequence[ColumnDataS
 
 def placed_columns(seen: PlacedView, lasting: Columns) -> dict[str, Columns]:
     """What a structure gives the sources of a page."""
-    rows = [(axis, "axis_label", label) for axis, label in seen.labels.items()]
+    times = seen.columns["all_motion"]["t"]
+    rows = [*((axis, "axis_label", label) for axis, label in seen.labels.items()),
+            *time_rows(float(times[0]), float(np.max(times)))]  # fmt: skip
     return {**seen.columns, "frame": frame(rows, _frequencies(seen), {"history": history_ends(lasting)})}
 
 

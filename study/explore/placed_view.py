@@ -21,7 +21,7 @@ from study.explore.axis_scales import Columns, Floats
 from study.explore.check_columns import by_itself
 from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.placed_words import placed_words
-from study.explore.session import Stage
+from study.explore.session import Stage, on_record
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
@@ -39,10 +39,14 @@ class PlacedView:
     labels: dict[str, str]  # of axes, by the axis
 
 
-def placed_view(stage: Stage, step: int, live: bool = True) -> PlacedView:
-    """The columns of a structure, by its number in the session; only a ``live`` page can act."""
+def placed_view(found: Stage, step: int, live: bool = True, record: int = 0) -> PlacedView:
+    """The columns of a structure, by its number in the session, on one of the records; only a ``live`` page can act.
+
+    What the sketch shows was found of all records together.
+    """
+    stage = on_record(found, record)
     comparison = stage.comparison
-    drawn = sketch_of(comparison) if stage.diagnosis is None else sketch_of_diagnosis(stage.diagnosis)
+    drawn = sketch_of(found.comparison) if found.diagnosis is None else sketch_of_diagnosis(found.diagnosis)
     labels = {link.place.path: link.place.label for link in drawn.links}
     lengths, forces = _scales(comparison)
     stiffness, unit = _stiffness(comparison, labels)
@@ -56,7 +60,7 @@ def placed_view(stage: Stage, step: int, live: bool = True) -> PlacedView:
         "all_spectrum": _spectra(comparison),
         "all_constancy": _constancy(stage),
         **_checks(comparison),
-        "words": placed_words(stage, drawn, step, live),
+        "words": placed_words(found, stage, drawn, step, live),
     }  # fmt: skip
     force = in_text(forces.unit)
     axes = {

@@ -1,7 +1,7 @@
 """The words of a structure's page as fragments of HTML, by the name of their place; what a user typed is escaped."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -10,6 +10,7 @@ from study.compare.dependence import explained_by_place
 from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words as placed
+from study.explore import record_words
 from study.explore.page_units import in_percent, with_error
 from study.explore.session import Stage
 from study.explore.words import VERDICTS, figure, gives, in_words, shared_words
@@ -20,17 +21,21 @@ from study.support.numbers import percent
 TRIED = 8  # candidates that are named of one place
 
 
-def placed_words(stage: Stage, drawn: Sketch, step: int, live: bool) -> dict[str, Any]:
-    """Every fragment of a structure, as columns ``place`` and ``html``."""
+def placed_words(found: Stage, stage: Stage, drawn: Sketch, step: int, live: bool) -> dict[str, Any]:
+    """Every fragment of a structure, as found of all records and as one shows it, as columns ``place`` and ``html``."""
     comparison = stage.comparison
     chosen = max(drawn.links, key=lambda link: link.share).place
-    fragments = shared_words(stage, stage.shown, step, live) | {
-        "figures": _figures(comparison),
-        "sketch": svg(drawn, chosen),
-        "sketch-hint": escape(_hint(stage)),
-        "places": _places(stage, drawn),
-        "modes": _modes(stage),
-    }
+    fragments = (
+        shared_words(stage, stage.shown, step, live)
+        | {
+            "figures": _figures(comparison),
+            "sketch": svg(drawn, chosen),
+            "sketch-hint": escape(_hint(stage)),
+            "places": _places(stage, drawn, explained_by_place(found.comparison.leftovers)),
+            "modes": _modes(stage),
+        }
+        | record_words.words(found, comparison.record.name, live)
+    )
     return {"place": list(fragments), "html": list(fragments.values())}
 
 
@@ -54,11 +59,13 @@ def _hint(stage: Stage) -> str:
     return "A connection glows with the share of what is left that general functions of its own motion explain."
 
 
-def _places(stage: Stage, drawn: Sketch) -> str:
-    """What is known of each place, one block each: the script shows that of the selected one."""
+def _places(stage: Stage, drawn: Sketch, general: Mapping[frozenset[str], float]) -> str:
+    """What is known of each place, one block each: the script shows that of the selected one.
+
+    ``general`` is what functions of the motion of each place explain of what is left.
+    """
     comparison = stage.comparison
     shares = {place.path: share for place, share in comparison.missing.aligned}
-    general = explained_by_place(comparison.leftovers)
     rows = stage.diagnosis.candidates if stage.diagnosis is not None else ()
     blocks: list[str] = []
     for link in drawn.links:

@@ -1,5 +1,6 @@
 """The tables of several records as fragments of HTML: how good the one model is on each, and their own coefficients."""
 
+import math
 from collections.abc import Sequence
 from html import escape
 
@@ -27,7 +28,7 @@ def words(stage: Stage, shown: str, live: bool) -> dict[str, str]:
 
 def _records(stage: Stage, shown: str) -> str:
     """A row a record, whose name is a button that turns the panels to it, and one for all."""
-    unit = in_text(stage.comparison.record.units.get("force", ""))
+    unit = in_text(stage.comparison.record.force_and_length[0])
     heads = ("record", f"rms force / {escape(unit)}", "error", "noise floor", "of force", "own fit")
     head = "".join(f"<th{f' title={chr(34)}{OWN}{chr(34)}' if h == 'own fit' else ''}>{h}</th>" for h in heads)
     own = stage.by_record.errors if stage.by_record is not None else ()
@@ -54,7 +55,7 @@ def _row(name: str, comparison: Comparison, own: str) -> str:
         level,
         in_percent(judged.error),
         in_percent(judged.floor),
-        in_percent(comparison.force.total),
+        in_percent(comparison.force_error),
         own,
     )
     return f"<tr><th>{name}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
@@ -62,8 +63,8 @@ def _row(name: str, comparison: Comparison, own: str) -> str:
 
 def judged_level(comparison: Comparison) -> float:
     """Rms force of the part that is judged."""
-    force = comparison.record["force"][slice(*comparison.plan.judge)]
-    return float(force.std())
+    record, judged = comparison.record, slice(*comparison.plan.judge)
+    return math.hypot(*(float(record[force][judged].std()) for force in record.forces))
 
 
 def _levels(stage: Stage, live: bool) -> str:
@@ -84,7 +85,7 @@ def _levels(stage: Stage, live: bool) -> str:
         return "<p>every coefficient is held</p>"
     forces = [number(force, 3) for force in found.levels[0].force]
     columns = zip(found.names, forces, strict=True)
-    unit = in_text(stage.comparison.record.units.get("force", ""))
+    unit = in_text(stage.comparison.record.force_and_length[0])
     head = "".join(f"<th>{escape(name)}<small>{force} {escape(unit)}</small></th>" for name, force in columns)
     rows = "".join(_level(level) for level in found.levels)
     return f"<table><tr><th></th>{head}<th>differs?</th></tr>{rows}</table><p>{DIFFERS}</p>"

@@ -3,6 +3,7 @@
 import json
 import re
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +13,14 @@ from study.compare.comparison import compare
 from study.equations import model_file
 from study.explore import session as sessions
 from study.explore.desk import Desk
+from study.explore.html_page import seen_of
 from study.explore.placed_view import placed_view
+from study.explore.saved import saved
 from study.explore.saved_files import PAGE, files
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
+from study.way_in.compare_records import compare_records
 
 CUBIC = "cubic_stiffness[floor2-floor3]"
 
@@ -116,6 +120,26 @@ def test_what_is_saved_holds_model_history_tables_pictures_and_the_page(hall, gr
     assert json.loads(made["frame.history.json"])["steps"][1]["added"] == CUBIC
     assert b"http://" not in re.sub(rb"http://www\.w3\.org[^\"' ]*", b"", made[PAGE][:4000])
     assert made[PAGE] == files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)[PAGE]
+
+
+def test_several_records_of_a_structure_are_shown_one_by_one(hall):
+    """One model is fitted to both parts of the record."""
+    model = model_file.read_model(hall / "frame.yaml")
+    whole = read_record(hall / "frame.csv", roles=model.roles)
+    parts = [replace(whole.part(*span), name=name) for name, span in (("first", (0, 800)), ("then", (800, 1600)))]
+    session = sessions.begin_with(compare_records(parts, model).comparison)
+    assert [c.record.name for c in session.now.on_each] == ["first", "then"]
+    for number, name in enumerate(("first", "then")):
+        seen = seen_of(session.now, 0, record=number)
+        said = dict(zip(*seen.columns["words"].values(), strict=True))
+        assert said["of-record"] == f"of {name}"
+        assert said["records"].count("data-act='record'") == 2
+        judged = session.now.on_each[number].prediction
+        assert seen.columns["all_motion"]["t"][0] == pytest.approx(judged.time[0], abs=1e-3)
+        assert seen.columns["sensors"]["error"] == pytest.approx(100.0 * judged.errors, rel=1e-5)
+        assert "data-place='floor2-floor3'" in said["places"]
+    page = saved(session).decode()
+    assert {"words@0.0", "words@0.1", "all_map@0.1"} <= set(re.findall(r"\w+@\d\.\d", page))
 
 
 @pytest.mark.long
