@@ -86,11 +86,6 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _page(comparison: "Comparison", unpaged: str) -> dict[str, bytes]:
-    if comparison.model.named:
-        from study.structure.structure_page import PAGE as BY_PLACE
-        from study.structure.structure_page import structure_page
-
-        return {BY_PLACE: structure_page(comparison)}
     if unpaged:
         return {}
     from study.explore.saved import of_comparison

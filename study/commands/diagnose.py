@@ -18,9 +18,14 @@ from study.commands.record_arguments import (
 )
 
 if TYPE_CHECKING:
+    from study.compare.comparison import Comparison
+    from study.diagnose.needless import Needless
+    from study.diagnose.verdict import Diagnosis
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
+
+PAGE = "explore.html"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,7 +91,6 @@ def _diagnosed(
     from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
-    from study.structure.structure_page import PAGE, structure_page
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
@@ -115,7 +119,20 @@ def _diagnosed(
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
     files = diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
-    return files | ({PAGE: structure_page(accounted.comparison, diagnosis)} if model.named else {})
+    return files | (_page(accounted.comparison, diagnosis, unneeded) if model.named else {})
+
+
+def _page(
+    comparison: "Comparison", diagnosis: "Diagnosis", unneeded: "tuple[Needless, ...]"
+) -> dict[str, bytes]:  # fmt: skip
+    """What is missing of a structure, and where, to be looked at place by place; none without what draws it."""
+    from study.support.extras import lacking
+
+    if lacking("bokeh", PAGE, "explore"):
+        return {}
+    from study.explore.saved import of_diagnosis
+
+    return {PAGE: of_diagnosis(comparison, diagnosis, unneeded)}
 
 
 COMMAND = Command(

@@ -6,7 +6,6 @@ script draws that of the selected one.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +21,10 @@ from study.explore.check_columns import by_itself
 from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.placed_words import placed_words
 from study.explore.session import Stage, on_record
+from study.explore.view import NINETY_FIVE, single_precision
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
-
-NINETY_FIVE = 1.96  # standard errors to each side
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +65,7 @@ def placed_view(found: Stage, step: int, live: bool = True, record: int = 0) -> 
         "map_x": f"relative displacement / {in_text(lengths.unit)}", "map_y": f"missing force / {force}",
         "force_y": f"missing force / ({force}/√Hz)", "stiffness_y": f"stiffness / ({unit})",
     }  # fmt: skip
-    return PlacedView({name: _small(c) for name, c in columns.items()}, drawn, highest_frequency(comparison), axes)
-
-
-def _small(columns: Columns) -> Columns:
-    return {n: np.asarray(c, dtype=np.float32) if _plain(c) else c for n, c in columns.items()}
-
-
-def _plain(column: Any) -> bool:
-    return getattr(column, "dtype", None) == np.float64
+    return PlacedView(single_precision(columns), drawn, highest_frequency(comparison), axes)
 
 
 def _scales(comparison: Comparison) -> tuple[Scale, Scale]:

@@ -15,7 +15,6 @@ from study.explore.page_units import in_percent, with_error
 from study.explore.session import Stage
 from study.explore.words import VERDICTS, figure, gives, in_words, shared_words
 from study.figures.sketch import Sketch, svg
-from study.structure.structure_page import terms_there
 from study.support.numbers import percent
 
 TRIED = 8  # candidates that are named of one place
@@ -70,7 +69,7 @@ def _places(stage: Stage, drawn: Sketch, general: Mapping[frozenset[str], float]
     blocks: list[str] = []
     for link in drawn.links:
         path = link.place.path
-        known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(terms_there(comparison, path))}</p>"]
+        known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(_terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(
                 f"<p>Any force there could make {in_percent(shares[path])} of what stands above the noise; general "
@@ -86,6 +85,16 @@ def _places(stage: Stage, drawn: Sketch, general: Mapping[frozenset[str], float]
         label, ends = escape(link.place.label), escape(" ".join(link.place.moving))
         blocks.append(f"<div class='about' data-place='{label}' data-ends='{ends}'>{''.join(known)}</div>")
     return "".join(blocks)
+
+
+def _terms_there(comparison: Comparison, path: frozenset[str]) -> str:
+    """The terms that the model has at a place, in a sentence."""
+    names = [
+        in_words(e.term.name)
+        for e in comparison.model.terms
+        if e.place.path == path and (e.term.name != "inertia" or e.place.kind != "at")
+    ]
+    return f"The model has {', '.join(names)} there." if names else "The model has no term there."
 
 
 def _tried(row: Ranked) -> str:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,11 +11,13 @@ from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
 
 from study.compare.comparison import Comparison
+from study.diagnose.needless import Needless
+from study.diagnose.verdict import Diagnosis
 from study.explore import html_page
 from study.explore.any_page import ROOT, Page, history_columns, template
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
-from study.explore.session import Session, begin_with
+from study.explore.session import Session, begin_with, with_diagnosis, with_stage
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
@@ -61,6 +64,12 @@ def as_file(made: Page, values: Mapping[str, Any]) -> bytes:
 def of_comparison(comparison: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
     return saved(begin_with(comparison))
+
+
+def of_diagnosis(comparison: Comparison, diagnosis: Diagnosis, unneeded: tuple[Needless, ...]) -> bytes:
+    """The same of a comparison and its diagnosis, and the terms that the model does not need."""
+    session = begin_with(comparison)
+    return saved(with_stage(session, with_diagnosis(replace(session.now, unneeded=unneeded), diagnosis)))
 
 
 def _marked(history: Columns, place: int) -> Columns:

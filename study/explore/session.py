@@ -213,9 +213,13 @@ def examined(session: Session, progress: Progress | None = None) -> tuple[Stage,
     And the diagnosis.
     """
     diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
-    now = weighed(session).now
-    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
-    return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
+    return with_diagnosis(weighed(session).now, diagnosis), diagnosis
+
+
+def with_diagnosis(stage: Stage, diagnosis: Diagnosis) -> Stage:
+    """A stage whose terms were weighed with its diagnosis, in words too, and what each candidate would leave."""
+    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(stage.unneeded or (), diagnosis)}".strip()
+    return _foreseen(replace(stage, diagnosis=diagnosis, said=said))
 
 
 def _foreseen(stage: Stage) -> Stage:

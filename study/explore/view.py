@@ -1,6 +1,6 @@
 """What a page shows of a model, as columns by the name of their source: numbers in the units of the axes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,11 +60,12 @@ def view(found: Stage, step: int, live: bool = True, record: int = 0) -> View:
         **_links(comparison, scales),
         "words": _words(found, stage, step, live, force.unit),
     }
-    small = {name: _small(c) for name, c in columns.items()}
     limits, highest = force_limits(comparison), comparison.force.highest
     unit = in_text(comparison.record.units.get("force", ""))
     kind = check_columns.kind_of(comparison.prepared)
-    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor, unit, kind)
+    return View(
+        single_precision(columns), scales, highest, comparison.plan.response, limits, least / force.factor, unit, kind
+    )
 
 
 def _words(found: Stage, stage: Stage, step: int, live: bool, force_unit: str) -> Columns:
@@ -74,13 +75,14 @@ def _words(found: Stage, stage: Stage, step: int, live: bool, force_unit: str) -
     return {"place": [*said["place"], *more], "html": [*said["html"], *more.values()]}
 
 
-def _small(columns: Columns) -> Columns:
+def single_precision(sources: Mapping[str, Columns]) -> dict[str, Columns]:
     """Single precision: a screen shows no more, and a saved page is half as large. What is beyond it is not drawn."""
+
+    def single(column: Any) -> Any:
+        return np.asarray(column, dtype=np.float32) if getattr(column, "dtype", None) == np.float64 else column
+
     with np.errstate(over="ignore"):
-        return {
-            name: np.asarray(c, dtype=np.float32) if getattr(c, "dtype", None) == np.float64 else c
-            for name, c in columns.items()
-        }
+        return {source: {name: single(c) for name, c in columns.items()} for source, columns in sources.items()}
 
 
 def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:

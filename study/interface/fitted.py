@@ -310,10 +310,6 @@ class Fit(FitPictures):
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
         from study.support.extras import needed
 
-        if self.given.coordinates:
-            from study.structure.structure_page import structure_page
-
-            return structure_page(self.comparison)
         needed("bokeh", "the page", "explore")
         from study.explore.saved import of_comparison
 

@@ -70,7 +70,7 @@ def document(path: Path) -> dict:
 
 def test_two_records_of_one_name_are_told_apart(folder):
     out = compared(folder, records=("b.csv", "again/b.csv"), out="two")
-    assert {path.name for path in out.glob("*structure.html")} == {"b_1_structure.html", "b_2_structure.html"}
+    assert {path.name for path in out.glob("*explore.html")} == {"b_1_explore.html", "b_2_explore.html"}
     both = document(out / "comparison.json")
     assert [found["record"] for found in both["records"]] == ["b_1", "b_2"]
     stiffness = [found["coefficients"][2]["value"] for found in both["records"]]
