@@ -9,7 +9,7 @@ import pytest
 
 STUDY = Path(__file__).parents[1] / "study"
 FLOORS = (
-    "cli", "commands", "interface", "explore", "trials", "gallery", "reproduction", "structure", "diagnose", "way_in",
+    "cli", "commands", "interface", "explore", "trials", "gallery", "reproduction", "diagnose", "way_in",
     "faults", "compare", "figures", "identify", "equations", "records", "support",
 )  # fmt: skip
 FILES = sorted(STUDY.rglob("*.py"))

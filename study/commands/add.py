@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands import structures
+from study.commands import modal
 from study.commands.command import Command
 from study.commands.record_arguments import out_folder
 from study.commands.revision import add_revision_arguments, revise
@@ -35,7 +35,7 @@ def _run(arguments: argparse.Namespace) -> None:
         entry = _entry(arguments, model, term)
         text = text_with(arguments.model, entry)
         if model.modal:
-            structures.revise_modal(arguments, model, model.with_term(entry), text, folder, added=entry.name)
+            modal.revise_modal(arguments, model, model.with_term(entry), text, folder, added=entry.name)
         else:
             revise(arguments, model, text, folder, lambda before: added(before, entry), added=entry.name)
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands import structures
+from study.commands import modal
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_together,
@@ -59,7 +59,7 @@ def _run(arguments: argparse.Namespace) -> None:
     for name in arguments.without:
         terms.get(name)
     if model.modal:
-        structures.diagnose_modal_command(arguments, model, own)
+        modal.diagnose_modal_command(arguments, model, own)
         return
     files: dict[str, bytes] = {}
     records = read_records(arguments, model)

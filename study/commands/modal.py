@@ -1,4 +1,4 @@
-"""What the commands do with a model of several coordinates."""
+"""What the commands do with a model whose linear part is a sum of modes."""
 
 import argparse
 from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def modal_records(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
-    """The records that were named, made ready for a model whose linear part is as measured."""
+    """The records that were named, made ready for such a model."""
     from study.faults.fault import settings_beside
     from study.records.sampling_rate import without_spare_samples
     from study.support.errors import at, expect
@@ -44,7 +44,7 @@ def modal_records(arguments: argparse.Namespace, model: "Model") -> "list[Prepar
 
 
 def compare_modal_command(arguments: argparse.Namespace, model: "Model") -> None:
-    """``study compare`` where the linear part is as measured."""
+    """``study compare`` where the linear part is a sum of modes."""
     from study.compare.comparison_report import as_json
     from study.compare.modal_comparison import compare_modal, modal_document, modal_summary
     from study.support.files import write_files

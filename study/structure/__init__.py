@@ -1,1 +1,0 @@
-"""Structures of several coordinates: their motion under forces, and which effect is missing where."""
