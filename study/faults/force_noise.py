@@ -95,7 +95,7 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     that noise lets escape, or does not move at all, are left out; None where these are all.
     """
     rng, record = np.random.default_rng(0), left.prepared.record
-    run, quiet = left.run, np.concatenate(left.predicted)
+    run, quiet = left.run, np.concatenate(left.predicted)[:, 0]
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
     def logarithm(white: Floats) -> Floats | None:
