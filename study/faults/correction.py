@@ -3,7 +3,7 @@
 How the response changes with such a number, how a channel is rid of it, and which samples say nothing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +12,12 @@ from study.faults.fault import ALL_SENSORS, DELAY, GAIN_CHANGE, HIGH_PASS, OFFSE
 from study.faults.imposed import high_passed, shifted
 from study.faults.leftover import Columns, FittedResidual, SensorResidual
 from study.identify.time_domain.part_fit import run_of
-from study.records.completion import derivative
 from study.records.prepared import Prepared, prepare_record
 from study.records.states import angular_rate
 from study.support.arrays import Bools, Floats
 
 FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
-LITTLE = 0.05  # samples by which a force is moved to see what a delay of it does
+STIRRED = 0.05  # samples by which a force is moved to see what a delay of it does
 BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
 
 
@@ -34,7 +33,7 @@ def fault_columns(fault: str, channel: str, left: FittedResidual, value: float =
     the record has been corrected for already.
     """
     if channel == ALL_SENSORS:
-        each = [sensor.stacked(_later(sensor)) for sensor in left.sensors]
+        each = [sensor.stacked(sensor.by_late_reading) for sensor in left.sensors]
         return np.sum([first for first, _ in each], axis=0), np.sum([second for _, second in each], axis=0)
     if channel in left.prepared.record.forces and left.prepared.response != channel:
         return _by_late_force(channel, left)
@@ -52,17 +51,11 @@ def _own_columns(fault: str, left: SensorResidual, value: float) -> Columns:
         first, second = left.samples
         return (fitted * first / last)[:, None], (judged * second / last)[:, None]
     if fault == DELAY:
-        return _later(left)
+        return left.by_late_reading
     cutoff = value or FIRST * angular_rate(fitted, dt) / (2.0 * np.pi)
     fall = np.exp(-2.0 * np.pi * cutoff * dt * np.arange(len(fitted)))
-    first, second = _along(left, lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
+    first, second = left.changed(lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
     return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
-
-
-def _later(left: SensorResidual) -> Columns:
-    """Change of a sensor's response with each sample that it is read late."""
-    dt = left.prepared.dt
-    return _along(left, lambda motion: -dt * derivative(motion, dt, 1))
 
 
 def _by_late_force(force: str, left: FittedResidual) -> Columns:
@@ -70,24 +63,15 @@ def _by_late_force(force: str, left: FittedResidual) -> Columns:
     prepared = left.prepared
     values = prepared.record[force]
     moved: list[Columns] = []
-    for late in (-LITTLE, LITTLE):
+    for late in (-STIRRED, STIRRED):
         record = prepared.record.with_channels({force: shifted(values, late)})
         other = replace(prepared, record=record)
         fitted = run_of(left.fit, other).respond({}, left.fit.initial)[0]
         moved.append((fitted, replace(left.run, prepared=other).motions()))
     outputs = prepared.outputs
     early, later = moved
-    first, second = (outputs.stacked(a - b)[:, None] / (2.0 * LITTLE) for a, b in zip(early, later, strict=True))
+    first, second = (outputs.stacked(a - b)[:, None] / (2.0 * STIRRED) for a, b in zip(early, later, strict=True))
     return first, second
-
-
-def _along(left: SensorResidual, change: Callable[[Floats], Floats]) -> Columns:
-    """A linear change of the predicted response, along both parts at once where they follow each other."""
-    fitted, judged = left.predicted
-    if left.whole.spans[0][1] != left.whole.spans[1][0]:
-        return change(fitted)[:, None], change(judged)[:, None]
-    both = change(np.concatenate([fitted, judged]))[:, None]
-    return both[: len(fitted)], both[len(fitted) :]
 
 
 def sensible(fault: str, value: float, left: FittedResidual) -> bool:

@@ -3,6 +3,7 @@
 A fault or an effect gets no more than the model's own coefficients and initial state could not take.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,12 +18,13 @@ from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import JudgingRun, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Start
+from study.records.completion import derivative
 from study.records.prepared import Prepared
 from study.records.record import Sensor
 from study.support.arrays import Floats, Ints
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
-from study.support.least_squares import least_squares
+from study.support.least_squares import least_squares, pseudo_inverse
 from study.support.statistics import Gain, clustered_covariance, gain, gain_beside, worse
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
@@ -92,12 +94,17 @@ class FittedResidual:
         return next(sensor for sensor in self.sensors if sensor.channel == channel)
 
     @cached_property
-    def beside_own(self) -> Floats:
-        """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take, (m s,).
+    def taking(self) -> tuple[Floats, Floats]:
+        """What makes of a column the amounts of ``own`` nearest to it: of the fitting part's, and of both parts'.
 
-        A change of the prediction is held against this (``study.support.statistics.gain_beside``).
+        Shapes (p + states, n s) and (p + states, n s + m s).
         """
-        return self.residual[1] - self.own[1] @ least_squares(np.vstack(self.own), self.both, 1e-9)
+        return pseudo_inverse(self.own[0], 1e-9), pseudo_inverse(np.vstack(self.own), 1e-9)
+
+    @cached_property
+    def beside_own(self) -> Floats:
+        """Residual of both parts beside what the model's own coefficients, fitted to both, take, (n s + m s,)."""
+        return self.both - np.vstack(self.own) @ (self.taking[1] @ self.both)
 
     @property
     def spans(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -183,6 +190,20 @@ class SensorResidual:
         count = len(self.prepared.outputs)
         return self.prepared.known(np.ones((span[1] - span[0]) * count), span)[self.number :: count]
 
+    def changed(self, change: Callable[[Floats], Floats]) -> Columns:
+        """A linear change of its response, shapes (n, 1) and (m, 1): of both parts at once where they follow."""
+        fitted, judged = self.predicted
+        if self.whole.spans[0][1] != self.whole.spans[1][0]:
+            return change(fitted)[:, None], change(judged)[:, None]
+        both = change(np.concatenate([fitted, judged]))[:, None]
+        return both[: len(fitted)], both[len(fitted) :]
+
+    @cached_property
+    def by_late_reading(self) -> Columns:
+        """Change of its response with each sample that it is read late, shapes (n, 1) and (m, 1)."""
+        dt = self.prepared.dt
+        return self.changed(lambda motion: -dt * derivative(motion, dt, 1))
+
     def stacked(self, columns: Columns) -> Columns:
         """Columns of this sensor, shapes (n, k) and (m, k), among those of all, which are zero: (n s, k), (m s, k)."""
         outputs = self.prepared.outputs
@@ -252,25 +273,19 @@ def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Shar
     or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
-    taken = _taken(left.own[0], fitted)
+    taken = left.taking[0] @ fitted
     alone = fitted - left.own[0] @ taken
     if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
         return None
     change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
     whole, covariance = amounts_on_both(left, columns)
-    both = np.vstack(left.own)
-    apart = np.vstack([fitted, judged]) - both @ _taken(both, np.vstack([fitted, judged]))
-    power = float(np.mean((apart @ whole) ** 2)) / left.size**2
+    power = float(np.mean((_apart(left, columns) @ whole) ** 2)) / left.size**2
     count = 1 if leading else len(whole)
     wald = float(whole[:count] @ np.linalg.pinv(covariance[:count, :count], hermitian=True) @ whole[:count])
     freedom = 2 * BLOCKS - count  # the covariance rests on blocks: the test is Hotelling's, as these are few
     p_value = float(fdtrc(count, freedom, wald * freedom / (count * (2 * BLOCKS - 1))))
-    return Share(whole, covariance, p_value, gain_beside(left.residual[1], change, left.beside_own), power)
-
-
-def _taken(own: Floats, columns: Floats) -> Floats:
-    """Amounts of the model's own sensitivities that come nearest to each column, shape (p, k)."""
-    return np.column_stack([least_squares(own, column, 1e-9) for column in columns.T])
+    found = gain_beside(left.residual[1], change, left.beside_own[len(fitted) :])
+    return Share(whole, covariance, p_value, found, power)
 
 
 def gained(before: FittedResidual, after: FittedResidual) -> Gain:
@@ -293,11 +308,18 @@ def leaves_less(before: FittedResidual, after: FittedResidual, asked: int) -> bo
 
 def amounts_on_both(left: FittedResidual, columns: Columns) -> tuple[Floats, Floats]:
     """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
-    fitted, judged = left.known(columns)
-    count = fitted.shape[1]
-    design = np.vstack([np.hstack([left.own[0], fitted]), np.hstack([left.own[1], judged])])
-    amounts = least_squares(design, left.both, 1e-9)
-    return amounts[-count:], clustered_covariance(design, left.both - design @ amounts)[-count:, -count:]
+    apart, own = _apart(left, columns), left.taking[1]
+    amounts = least_squares(apart, left.both, 1e-9)
+    return amounts, clustered_covariance(apart, left.beside_own - apart @ amounts, len(own))
+
+
+def _apart(left: FittedResidual, columns: Columns) -> Floats:
+    """Columns on both parts less what the model's own coefficients, fitted to both, take of them, (n s + m s, k).
+
+    A regression on these has the amounts of one on all of them (Frisch and Waugh, 1933).
+    """
+    together = np.vstack(left.known(columns))
+    return together - np.vstack(left.own) @ (left.taking[1] @ together)
 
 
 def asks_for_more(left: FittedResidual) -> bool:

@@ -140,7 +140,12 @@ def test_a_fault_that_is_held_beside_a_structure_is_that_of_its_channel(folder, 
     (tmp_path / "b.record.yaml").write_text("measurement: {offset: {b displacement: 0.25}, delay: off}\n")
     assert main(words) == 0
     held, *_ = document(tmp_path / "out" / "comparison.json")["measurement"]
-    assert (held["fault"], held["channel"], held["value"], held["corrected"]) == ("offset", "b displacement", 0.25, True)
+    assert (held["fault"], held["channel"], held["value"], held["corrected"]) == (
+        "offset",
+        "b displacement",
+        0.25,
+        True,
+    )
     (tmp_path / "b.record.yaml").write_text("measurement: {offset: 0.25}\n")
     assert main(words) == 2
     assert "there are several sensors; expected a value by channel" in capsys.readouterr().err

@@ -103,7 +103,9 @@ def test_lost_samples_of_a_sensor_are_lost_of_that_sensor_alone(clean, fuller):
 
 def test_a_force_among_several_is_read_late(truth, fuller):
     both = replace(truth, forces=(*truth.forces, ("second shaker", "second")))
-    drives = {name: force(Excitation(level=0.3, cutoff=8.0), 4096, 0.02, seed) for seed, (name, _) in enumerate(both.forces)}
+    drives = {
+        name: force(Excitation(level=0.3, cutoff=8.0), 4096, 0.02, seed) for seed, (name, _) in enumerate(both.forces)
+    }
     quiet, rng = simulate(both, drives, 0.02, Integrator("rk4", 8)), np.random.default_rng(5)
     kept = {s: x for s, x in quiet.motions.items() if s.motion == "displacement"}
     record = quiet.with_motions({s: x + 0.03 * np.std(x) * rng.standard_normal(4096) for s, x in kept.items()})
@@ -122,5 +124,5 @@ def test_values_that_are_known_are_those_of_channels(clean, fuller, truth):
     assert far_off(result.comparison, truth) < FAR
     with pytest.raises(StudyError, match="holds offset of 'third displacement'; expected one of first displacement"):
         compare_records([clean], fuller, settings=FaultSettings({"offset": {"third displacement": 1.0}}))
-    with pytest.raises(StudyError, match="'offset: {first displacement: 1}'"):
+    with pytest.raises(StudyError, match=r"'offset: \{first displacement: 1\}'"):
         compare_records([clean], fuller, settings=FaultSettings({"offset": 1.0}))
