@@ -89,7 +89,7 @@ def accounted(
     given = held_in(prepared, held or {})
     asked = asked_of(prepared, [name for name in FAULTS if name not in switched_off], given)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
-    if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE):
+    if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE or model.modal):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
