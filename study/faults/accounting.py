@@ -171,7 +171,7 @@ def _late_response(
     if not channels or (fit is not None and not is_poor(fit, needed(plain).fitted)):
         return None
     try:
-        if len(channels) > 1:
+        if model.named:
             found = _best_late(model, prepared, fit, faults, channels, needed)
             if found is None:
                 return None

@@ -50,7 +50,7 @@ from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
-from study.records.prepared import FORCE, Prepared, limited
+from study.records.prepared import Prepared, limited
 from study.support.errors import expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -114,13 +114,12 @@ def asked_of(prepared: Prepared, names: Sequence[str], held: Mapping[Asked, floa
     """Where faults of these names are looked for, but for those whose value is known.
 
     In each sensor. Several sensors may all be late together, against all forces, and of several forces each by itself.
-    Noise on the force is told from what one sensor shows.
+    Noise on the only force is told from what the only sensor shows.
     """
     sensors, forces = [str(sensor) for sensor in prepared.outputs.sensors], prepared.record.forces
     several = len(sensors) > 1
     late = (ALL_SENSORS, *sensors, *(forces if len(forces) > 1 else ())) if several else sensors
-    noisy = () if several else (FORCE,)
-    where = {DELAY: late, FORCE_NOISE: noisy}
+    where = {DELAY: late, FORCE_NOISE: () if several or len(forces) > 1 else forces}
     everywhere = [(name, channel) for name in names for channel in where.get(name, sensors)]
     return tuple(one for one in everywhere if one not in held)
 
@@ -267,7 +266,7 @@ def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> Se
         t = abs(one.fault.value) / one.fault.error
         one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
     effect = None
-    alone = len(stage.rich.sensors) == 1
+    alone = len(stage.rich.fit.model.coordinates) == 1
     if len(stage.effects) < EFFECTS and (one is not None or (alone and asks_for_more(stage.rich))):
         effect = missing(stage.rich)
     if one is None:
@@ -295,7 +294,7 @@ def _line(fault: Fault, left: FittedResidual) -> Columns:
 
 def _noisy_force(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> SearchStage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if (FORCE_NOISE, FORCE) not in open_ones or force_noise(stage.rich, asked, repeats=1) is None:
+    if FORCE_NOISE not in [name for name, _ in open_ones] or force_noise(stage.rich, asked, repeats=1) is None:
         return None
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)

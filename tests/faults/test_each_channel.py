@@ -126,3 +126,9 @@ def test_values_that_are_known_are_those_of_channels(clean, fuller, truth):
         compare_records([clean], fuller, settings=FaultSettings({"offset": {"third displacement": 1.0}}))
     with pytest.raises(StudyError, match=r"'offset: \{first displacement: 1\}'"):
         compare_records([clean], fuller, settings=FaultSettings({"offset": 1.0}))
+
+
+def test_one_sensor_of_a_structure_shows_its_faults(clean, believed):
+    only = clean.with_motions({s: x for s, x in clean.motions.items() if str(s) == FIRST})
+    late, _ = impose(only, FIRST, "spikes", np.random.default_rng(3))
+    assert [(f.fault, f.channel) for f in compare_records([late], believed).faults] == [("spikes", FIRST)]
