@@ -57,8 +57,8 @@ class Prediction:
     def misfit(self) -> Floats:
         """Measured minus predicted response at all frequencies, zero where a sample is lost, shape (n, s)."""
         left = self.measured - self.predicted
-        lost = self.prepared.lost
-        return left if lost is None else left * ~lost[slice(*self.prepared.plan.judge), None]
+        kept = self.prepared.known(np.ones(left.size), self.prepared.plan.judge)
+        return left * kept.reshape(left.shape)
 
     @cached_property
     def residual(self) -> Floats:

@@ -8,11 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from study.compare.prediction import Prediction, predict
-from study.equations.linear_part import connections
-from study.equations.model import Model, ModelTerm, free
-from study.equations.place import Place
+from study.equations.model import ModelTerm
 from study.equations.term import Term
-from study.equations.terms import effects_but, external, one_sided
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
@@ -52,23 +49,6 @@ class FittedCandidate:
         """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
         values = self.fit.model.values
         return self.term.physical({own: values.get(k) for own, k in zip(self.term.keys, self.entry.keys, strict=True)})
-
-
-def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[ModelTerm]:
-    """Every effect at every place where the model does not have it: the library's, and the user's own.
-
-    What depends on the sign of the motion alone, a stop on one side, is tried on either side of a place between two.
-    """
-    known = {(t.term.name, t.place.path) for t in model.terms}
-    found: list[ModelTerm] = []
-    for term in effects_but(without, extra):
-        outside = external(term)
-        for place in [Place("at", (c,)) for c in model.coordinates] if outside else connections(model):
-            if (term.name, place.path) not in known:
-                found.append(free(term, place))
-                if place.kind == "between" and not outside and one_sided(term):
-                    found.append(free(term, Place("between", place.ends[::-1])))
-    return found
 
 
 def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None) -> list[FittedCandidate]:

@@ -11,7 +11,7 @@ from study.compare.comparison import Comparison
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, pairs
-from study.diagnose.candidates import Progress, candidate_entries, with_best_settled
+from study.diagnose.candidates import Progress, with_best_settled
 from study.diagnose.constancy import changes, curves, wavers
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -20,6 +20,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.equations.linear_part import Modes, modes_of
 from study.equations.model import free
+from study.equations.possible_effects import candidate_entries
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import rough_steps

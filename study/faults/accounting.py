@@ -1,18 +1,32 @@
 """A comparison with the faults of the measurement accounted for: compare, find, correct, compare again."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected, fault_columns, unit_of
-from study.faults.fault import DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault
+from study.faults.fault import DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault, Held
 from study.faults.force_noise import force_noise
-from study.faults.leftover import amounts_on_both, leaves_less, leftover
-from study.faults.search import Refined, SearchEnd, first_faults, refined, search_faults, searched_part
+from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover
+from study.faults.search import (
+    FAR_APART,
+    Asked,
+    Refined,
+    SearchEnd,
+    asked_of,
+    first_faults,
+    held_in,
+    refined,
+    search_faults,
+    searched_part,
+)
 from study.faults.seen_in_residual import mean_response, slow_response
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -21,8 +35,7 @@ from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
-from study.support.errors import StudyError, expect
-from study.support.statistics import gain
+from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
@@ -41,7 +54,7 @@ def accounted(
     model: Model,
     prepared: Prepared,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Held | None = None,
     switched_off: Sequence[str] = (),
     estimator: str = FREE_RUN,
     progress: Callable[[str], None] | None = None,
@@ -56,7 +69,7 @@ def accounted(
     ----------
     model, prepared, estimator, progress
         As for :func:`study.compare.comparison.compare`.
-    held : mapping of float
+    held : mapping of float, or of mappings of float by channel
         Values of faults (of ``HOLDABLE``) that are known; they are corrected and not searched for.
     switched_off : sequence of str
         Faults that are not looked for.
@@ -73,32 +86,36 @@ def accounted(
     StudyError
         If the model cannot be fitted.
     """
-    known = dict(held or {})
-    single = f"measurement holds {', '.join(known)}, which is looked for in records of a single mass alone"
-    expect(not (known and model.named), f"{single}; expected 'measurement: off'")
-    asked = () if model.named else tuple(n for n in FAULTS if n not in switched_off and n not in known)
+    given = held_in(prepared, held or {})
+    asked = asked_of(prepared, [name for name in FAULTS if name not in switched_off], given)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
-    if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE):
+    if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE or model.modal):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
     needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if as_sampled else without_spare_samples
-    faults = first_faults(prepared, known, asked) if known or asked else ()
+    faults = first_faults(prepared, given, asked) if given or asked else ()
     first = corrected(prepared, faults)
     fewer = needed(first)
     if not asked:
         return _compared(model, fewer, faults, None, estimator, progress)
-    fit = fit_model(model, fewer)
-    lost = has_lost_the_motion(fit, fewer)
-    told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
-    end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
-    beneath = slow_response(first, len(asked)) if DRIFT in asked else None
-    if beneath is None and OFFSET in asked and (not fit.converged or has_lost_the_motion(fit, first)):
-        beneath = mean_response(first)
-    if beneath is not None:
-        end = _beneath(beneath, model, prepared, faults, asked, end)
-    if DELAY in asked and DELAY not in [fault.fault for fault in end.faults]:
-        late = _late_response(model, prepared, fit, faults, needed)
+    late: Refined | None = None
+    try:
+        fit = fit_model(model, fewer)
+    except StudyError:  # forces and motion too far apart in time let a structure escape
+        late = _late_response(model, prepared, None, faults, asked, needed)
+        if late is None:
+            raise
+        fit = late.left.fit
+        known = (*faults, late.fault)
+        end = search_faults(prepared, _on_all(fit, corrected(prepared, known)), known, asked)
+    else:
+        lost = has_lost_the_motion(fit, fewer)
+        told = tuple(one for one in asked if not (lost and one[0] in OF_THE_MOTION))
+        end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
+        end = _beneath_too(model, prepared, fit, faults, asked, end)
+        if DELAY not in [fault.fault for fault in end.faults]:
+            late = _late_response(model, prepared, fit, faults, asked, needed)
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
@@ -109,48 +126,63 @@ def accounted(
     return _compared(model, kept, end.faults, best, estimator, progress)
 
 
-def _beneath(
-    begin: Fault, model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
+def _beneath_too(
+    model: Model, prepared: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked],
     plain: SearchEnd,
 ) -> SearchEnd:  # fmt: skip
     """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
-    The second begins with the model fitted to the response without what may lie beneath it (``begin``): its slowest
-    lines, or its mean where a fit is lost.
+    The second begins with the model fitted to the responses without what may lie beneath them: their slowest lines, or
+    their means where a fit is lost.
     """
-    assert begin.waveform is not None
-    beneath = corrected(prepared, (*faults, begin))
+    first = corrected(prepared, faults)
+    drifting, offset = ([channel for name, channel in asked if name == one] for one in (DRIFT, OFFSET))
+    begin = [fault for channel in drifting if (fault := slow_response(first, channel, len(asked))) is not None]
+    if not begin and offset and (not fit.converged or has_lost_the_motion(fit, first)):
+        begin = [mean_response(first, channel) for channel in offset]
+    if not begin:
+        return plain
+    beneath = corrected(prepared, (*faults, *begin))
     try:
         begun = fit_model(model, beneath)
     except StudyError:
         return plain
     if has_lost_the_motion(begun, beneath):
         return plain
-    whole = replace(begun, residual=begun.residual + begin.waveform[slice(*begun.span)])  # of the record as it is
+    under = {fault.channel: fault.waveform for fault in begin if fault.waveform is not None}
+    none = np.zeros(len(prepared.record))
+    columns = np.stack([under.get(str(sensor), none) for sensor in begun.outputs.sensors], axis=1)
+    whole = replace(begun, residual=begun.residual + begun.outputs.stacked(columns[slice(*begun.span)]))  # as it is
     other = search_faults(prepared, whole, faults, asked)
     begun_with = any(fault.fault in (DRIFT, OFFSET) for fault in other.faults)
     return other if begun_with and _leaves_less(prepared, plain, other, "fit") else plain
 
 
 def _late_response(
-    model: Model, prepared: Prepared, fit: FreeRunFit, faults: Sequence[Fault],
+    model: Model, prepared: Prepared, fit: FreeRunFit | None, faults: Sequence[Fault], asked: Sequence[Asked],
     needed: Callable[[Prepared], Prepared],
 ) -> Refined | None:  # fmt: skip
     """A delay with which a model that had lost the motion follows it; None where it follows no better.
 
-    ``fit`` is the model fitted without a delay to the record that is corrected for ``faults``, ``needed`` gives the
-    samples that a fit asks for.
+    ``fit`` is the model fitted without a delay to the record that is corrected for ``faults``, None where that has no
+    finite motion; ``needed`` gives the samples that a fit asks for.
     """
-    plain = corrected(prepared, faults)
-    if not is_poor(fit, needed(plain).fitted):
+    plain, channels = corrected(prepared, faults), [channel for name, channel in asked if name == DELAY]
+    if not channels or (fit is not None and not is_poor(fit, needed(plain).fitted)):
         return None
     try:
-        late = delay_along_the_motion(fit.model, plain)
-        if not abs(late) > 0.0:
-            return None
-        begin = Fault(DELAY, prepared.response, late, unit=unit_of(DELAY, ""))
-        begun = fit_model(model, needed(corrected(prepared, (*faults, begin))))
-        follows = fit.restarts or begun.rms < fit.rms  # segments follow anything, with states of their own
+        if model.named:
+            found = _best_late(model, prepared, fit, faults, channels, needed)
+            if found is None:
+                return None
+            begin, begun = found
+        else:
+            late = math.nan if fit is None else delay_along_the_motion(fit.model, plain)
+            if not abs(late) > 0.0:
+                return None
+            begin = Fault(DELAY, channels[0], late, unit=unit_of(DELAY, ""))
+            begun = fit_model(model, needed(corrected(prepared, (*faults, begin))))
+        follows = fit is None or fit.restarts or begun.rms < fit.rms  # segments follow anything, by their own states
         if begun.restarts or not follows:
             return None
         look = searched_part(prepared)
@@ -158,16 +190,35 @@ def _late_response(
         left = leftover(_on_all(begun, late_too), late_too)
         if left is None:
             return None
-        covariance = amounts_on_both(left, fault_columns(DELAY, left, begin.value))[1]
+        covariance = amounts_on_both(left, fault_columns(DELAY, begin.channel, left, begin.value))[1]
         error = math.hypot(math.sqrt(max(float(covariance[0, 0]), 0.0)), TOLERANCE * begin.value)
         right = Refined(replace(begin, error=error), left)  # where the search begins may be the very value
-        return refined(DELAY, look, faults, left, begin.value) or right
+        return refined((DELAY, begin.channel), look, faults, left, begin.value) or right
     except StudyError:
         return None
 
 
+def _best_late(
+    model: Model, prepared: Prepared, fit: FreeRunFit | None, faults: Sequence[Fault], channels: Sequence[str],
+    needed: Callable[[Prepared], Prepared],
+) -> tuple[Fault, FreeRunFit] | None:  # fmt: skip
+    """Of a structure that has lost the motion, or has no finite one, the delay of a channel with which it follows best.
+
+    A model that lacks an effect is poor too, but follows the motion: then a delay shows in what it leaves.
+    """
+    if fit is not None and fit.converged and not has_lost_the_motion(fit, needed(corrected(prepared, faults))):
+        return None
+    tried: list[tuple[Fault, FreeRunFit]] = []
+    for channel in channels:
+        for late in FAR_APART:
+            begin = Fault(DELAY, channel, late, unit=unit_of(DELAY, ""))
+            with suppress(StudyError):
+                tried.append((begin, fit_model(model, needed(corrected(prepared, (*faults, begin))))))
+    return min(tried, key=lambda one: one[1].rms, default=None)
+
+
 def _begun_late(
-    late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str], plain: SearchEnd
+    late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[Asked], plain: SearchEnd
 ) -> SearchEnd:
     """The better end of two searches for faults, the other one of which begins with the response less late.
 
@@ -178,7 +229,7 @@ def _begun_late(
     left = leftover(following, less_late)
     if left is None:
         return plain
-    explained = math.nan if without is None else gain(without.residual[1], left.residual[1]).explained
+    explained = math.nan if without is None else gained(without, left).explained
     other = search_faults(prepared, following, (*faults, replace(late, explained=explained)), asked)
     kept = any(fault.fault == DELAY for fault in other.faults)
     better = kept and all(_leaves_less(prepared, plain, other, which) for which in ("fit", "rich"))

@@ -3,21 +3,21 @@
 How the response changes with such a number, how a channel is rid of it, and which samples say nothing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from study.faults.fault import DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET, Fault
+from study.faults.fault import ALL_SENSORS, DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET, Fault
 from study.faults.imposed import high_passed, shifted
-from study.faults.leftover import Columns, FittedResidual
-from study.records.completion import derivative
+from study.faults.leftover import Columns, FittedResidual, SensorResidual
+from study.identify.time_domain.part_fit import run_of
 from study.records.prepared import Prepared, prepare_record
-from study.records.record import Record
 from study.records.states import angular_rate
 from study.support.arrays import Bools, Floats
 
 FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
+STIRRED = 0.05  # samples by which a force is moved to see what a delay of it does
 BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
 
 
@@ -26,12 +26,22 @@ def unit_of(fault: str, response_unit: str) -> str:
     return {DELAY: "samples", GAIN_CHANGE: "1", HIGH_PASS: "Hz"}.get(fault, response_unit)
 
 
-def fault_columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
-    """Derivative of the response by the fault's value on both parts, shapes (n, k) and (m, k); the first column.
+def fault_columns(fault: str, channel: str, left: FittedResidual, value: float = 0.0) -> Columns:
+    """Derivative of the responses by the value of a channel's fault on both parts, shapes (n s, k) and (m s, k).
 
-    Others stand for what is not known of the channel at its first sample. ``value`` is what the record has been
-    corrected for already.
+    That is the first column. Others stand for what is not known of the channel at its first sample. ``value`` is what
+    the record has been corrected for already.
     """
+    if channel == ALL_SENSORS:
+        each = [sensor.stacked(sensor.by_late_reading) for sensor in left.sensors]
+        return np.sum([first for first, _ in each], axis=0), np.sum([second for _, second in each], axis=0)
+    if channel in left.prepared.record.forces and left.prepared.response != channel:
+        return _by_late_force(channel, left)
+    return left.of(channel).stacked(_own_columns(fault, left.of(channel), value))
+
+
+def _own_columns(fault: str, left: SensorResidual, value: float) -> Columns:
+    """The same of a sensor's own response, shapes (n, k) and (m, k)."""
     fitted, judged = left.predicted
     dt = left.prepared.dt
     if fault == OFFSET:
@@ -41,20 +51,27 @@ def fault_columns(fault: str, left: FittedResidual, value: float = 0.0) -> Colum
         first, second = left.samples
         return (fitted * first / last)[:, None], (judged * second / last)[:, None]
     if fault == DELAY:
-        return _along(left, lambda motion: -dt * derivative(motion, dt, 1))
+        return left.by_late_reading
     cutoff = value or FIRST * angular_rate(fitted, dt) / (2.0 * np.pi)
     fall = np.exp(-2.0 * np.pi * cutoff * dt * np.arange(len(fitted)))
-    first, second = _along(left, lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
+    first, second = left.changed(lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
     return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
 
 
-def _along(left: FittedResidual, change: Callable[[Floats], Floats]) -> Columns:
-    """A linear change of the predicted response, along both parts at once where they follow each other."""
-    fitted, judged = left.predicted
-    if left.spans[0][1] != left.spans[1][0]:
-        return change(fitted)[:, None], change(judged)[:, None]
-    both = change(np.concatenate([fitted, judged]))[:, None]
-    return both[: len(fitted)], both[len(fitted) :]
+def _by_late_force(force: str, left: FittedResidual) -> Columns:
+    """Change of the responses with each sample that a force is read late: it acts earlier than the model has it."""
+    prepared = left.prepared
+    values = prepared.record[force]
+    moved: list[Columns] = []
+    for late in (-STIRRED, STIRRED):
+        record = prepared.record.with_channels({force: shifted(values, late)})
+        other = replace(prepared, record=record)
+        fitted = run_of(left.fit, other).respond({}, left.fit.initial)[0]
+        moved.append((fitted, replace(left.run, prepared=other).motions()))
+    outputs = prepared.outputs
+    early, later = moved
+    first, second = (outputs.stacked(a - b)[:, None] / (2.0 * STIRRED) for a, b in zip(early, later, strict=True))
+    return first, second
 
 
 def sensible(fault: str, value: float, left: FittedResidual) -> bool:
@@ -64,7 +81,7 @@ def sensible(fault: str, value: float, left: FittedResidual) -> bool:
     if fault == HIGH_PASS:
         return 0.0 < value < 0.25 / left.prepared.dt
     if fault == DELAY:
-        return abs(value) < 0.05 * len(left.residual[0])
+        return abs(value) < 0.05 * left.fit.samples
     return True
 
 
@@ -77,25 +94,40 @@ def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
     wanted = [fault for fault in faults if fault.corrected]
     if not wanted:
         return prepared
-    record, response = prepared.record, prepared.response
-    masks = [fault.lost for fault in wanted if fault.lost is not None]
-    lost = np.any(masks, axis=0) if masks else None
-    values = record[response] if lost is None else _bridged(record[response], lost)
-    for fault in wanted:
+    record, compared = prepared.record, [str(sensor) for sensor in prepared.outputs.sensors]
+    channels = {name: c for name, c in record.channels.items() if name not in record.computed}
+    lost = np.zeros((len(record), len(compared)), dtype=np.bool_)
+    motions = dict.fromkeys((*compared, *map(str, record.sensors)))
+    for name in (*motions, *(force for force in record.forces if force not in motions)):
+        own = [fault for fault in wanted if fault.channel in (name, *((ALL_SENSORS,) if name in motions else ()))]
+        if own:
+            channels[name], mask = _without_faults(own, record[name], prepared.dt)
+            if name in compared:
+                lost[:, compared.index(name)] = mask
+    raw = replace(record, channels=channels, computed=frozenset[str]())
+    return replace(
+        prepare_record(raw, prepared.plan, prepared.low or None), notes=prepared.notes, sensors=prepared.sensors,
+        lost=(lost if len(compared) > 1 else lost[:, 0]) if np.any(lost) else None,
+    )  # fmt: skip
+
+
+def _without_faults(faults: Sequence[Fault], values: Floats, dt: float) -> tuple[Floats, Bools]:
+    """A channel without its faults, and which of its samples say nothing, shape (n,) each."""
+    lost = np.any([np.zeros(len(values), dtype=np.bool_), *(f.lost for f in faults if f.lost is not None)], axis=0)
+    values = _bridged(values, lost)
+    for fault in faults:
         if fault.waveform is not None and fault.fault != HIGH_PASS:
             values = values - fault.waveform
     for name in (OFFSET, GAIN_CHANGE, HIGH_PASS, DELAY):
-        for fault in wanted:
+        for fault in faults:
             if fault.fault == name:
-                values = _without_fault(name, values, fault.value, prepared.dt)
+                values = _without_fault(name, values, fault.value, dt)
                 if fault.waveform is not None:
                     values = values - fault.waveform
-    late = sum(abs(fault.value) for fault in wanted if fault.fault == DELAY)
-    if late and lost is not None:
+    late = sum(abs(fault.value) for fault in faults if fault.fault == DELAY)
+    if late and np.any(lost):
         lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + BESIDE) + 1), "same") > 0.5
-    channels = {name: c for name, c in record.channels.items() if name not in record.computed}
-    raw = Record(record.dt, {**channels, response: values}, record.units, record.name, record.start, record.period)
-    return replace(prepare_record(raw, prepared.plan, prepared.low or None), notes=prepared.notes, lost=lost)
+    return values, lost
 
 
 def _without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:

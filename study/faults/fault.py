@@ -18,6 +18,9 @@ FAULTS = (
 )  # fmt: skip
 HOLDABLE = (OFFSET, DELAY, HIGH_PASS, GAIN_CHANGE)  # faults that one number describes: a user may know it
 NAMED_ALONE = (CONVERTER_STEPS, FORCE_NOISE)  # there is nothing that would undo them
+Held = Mapping[str, float | Mapping[str, float]]  # values of faults by name, or by name and channel
+Given = Mapping[str, float | Mapping[str, float] | None]  # the same; None for a fault that is not looked for
+ALL_SENSORS = "motion of all sensors"  # the channel of a delay that all of several sensors have against all forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,7 @@ _SENTENCES: Mapping[str, Callable[[Fault], str]] = {
 class FaultSettings:
     """Faults with a value that is known, faults that are not looked for, and whether all samples are used."""
 
-    held: Mapping[str, float] = field(default_factory=dict[str, float])
+    held: Held = field(default_factory=dict[str, float | Mapping[str, float]])
     switched_off: tuple[str, ...] = ()
     as_sampled: bool = False
 
@@ -136,10 +139,10 @@ class FaultSettings:
 NOTHING_ASKED = FaultSettings(switched_off=FAULTS)
 
 
-def settings_asked(record: Path | None, given: Mapping[str, float | None] | bool | None = None) -> FaultSettings:
+def settings_asked(record: Path | None, given: Given | bool | None = None) -> FaultSettings:
     """The settings for a record that was read from a file, or for one of none.
 
-    What is ``given`` comes before what stands beside the file: values by name of the fault, or False to look for none.
+    What is ``given`` comes before what stands beside the file: values as ``Given`` has them, or False to look for none.
     Whether all samples are used is told beside the file alone.
 
     Raises
@@ -172,10 +175,12 @@ def settings_beside(record: Path) -> FaultSettings:
     return replace(asked, as_sampled=options.as_sampled)
 
 
-def settings_of(given: Mapping[str, float | None]) -> FaultSettings:
-    """Settings from values by name of the fault; None for a fault that is not looked for."""
-    for name, value in given.items():
+def settings_of(given: Given) -> FaultSettings:
+    """Settings from values by name of the fault, or by name and channel; None for a fault that is not looked for."""
+    for name in given:
         expect(name in FAULTS, f"measurement names {name!r}; expected one of {', '.join(FAULTS)}")
+    every = [(n, v) for n, own in given.items() for v in (own.values() if isinstance(own, Mapping) else (own,))]
+    for name, value in every:
         known = value is None or name in HOLDABLE
         expect(known, f"{name} is held at {value}; expected 'off', or a number for one of {', '.join(HOLDABLE)}")
         expect(name != "high_pass" or value is None or value > 0.0, f"high_pass is {value}; expected a cut-off above 0")

@@ -13,7 +13,6 @@ from scipy.fft import irfft, rfft, rfftfreq
 from study.faults.fault import FORCE_NOISE, Fault
 from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
-from study.records.prepared import FORCE
 from study.support.arrays import Floats
 from study.support.cores import side_by_side
 from study.support.errors import DivergenceError
@@ -61,7 +60,8 @@ def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fau
     power = _periodogram(residual)
     turn = 2.0 * np.pi * np.asarray(rfftfreq(len(residual)))[1:-1]
     on_response = min(_likely(power, _first_order(memory, turn)).cost for memory in MEMORIES)
-    memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[FORCE])), list[_Noise]()
+    (name,) = left.prepared.record.forces
+    memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[name])), list[_Noise]()
     for _ in range(repeats):
         passed = _passed(left, memory, size)
         if passed is None:
@@ -83,8 +83,8 @@ def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fau
     value = float(weights @ sizes)
     error = float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
     explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(residual**2))
-    unit = left.prepared.record.units.get(FORCE, "")
-    return Fault(FORCE_NOISE, FORCE, value, error, unit, min(explained, 1.0))
+    unit = left.prepared.record.units.get(name, "")
+    return Fault(FORCE_NOISE, name, value, error, unit, min(explained, 1.0))
 
 
 def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
@@ -95,12 +95,13 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     that noise lets escape, or does not move at all, are left out; None where these are all.
     """
     rng, record = np.random.default_rng(0), left.prepared.record
-    run, quiet = left.run, np.concatenate(left.predicted)
+    (force,) = record.forces
+    run, quiet = left.run, np.concatenate(left.predicted)[:, 0]
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
     def logarithm(white: Floats) -> Floats | None:
         noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
-        noisy = replace(left.prepared, record=record.with_channels({FORCE: record[FORCE] + size * noise}))
+        noisy = replace(left.prepared, record=record.with_channels({force: record[force] + size * noise}))
         with suppress(DivergenceError):
             fitted = run_of(left.fit, noisy).respond({}, left.fit.initial)[0][:, 0]
             judged = replace(run, prepared=noisy).motions()[:, 0]

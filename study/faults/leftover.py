@@ -3,6 +3,7 @@
 A fault or an effect gets no more than the model's own coefficients and initial state could not take.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,18 +11,20 @@ import numpy as np
 from scipy.special import fdtrc
 
 from study.compare.prediction import Prediction, predict
-from study.equations.model import ModelTerm, free
-from study.equations.terms import LIBRARY, effects_but
+from study.equations.model import ModelTerm
+from study.equations.possible_effects import candidate_entries
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import JudgingRun, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Start
+from study.records.completion import derivative
 from study.records.prepared import Prepared
+from study.records.record import Sensor
 from study.support.arrays import Floats, Ints
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
-from study.support.least_squares import least_squares
+from study.support.least_squares import least_squares, pseudo_inverse
 from study.support.statistics import Gain, clustered_covariance, gain, gain_beside, worse
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
@@ -35,7 +38,10 @@ RUNS = 20  # free runs of such a fit
 
 @dataclass(frozen=True, eq=False)
 class FittedResidual:
-    """Residual of a fitted model on the fitting and on the judging part; n and m samples, p keys."""
+    """Residual of a fitted model on the fitting and on the judging part; n and m samples, s sensors, p keys.
+
+    Those of several sensors are stacked (``records.outputs``).
+    """
 
     fit: FreeRunFit
     prediction: Prediction
@@ -53,7 +59,7 @@ class FittedResidual:
 
     @cached_property
     def own(self) -> Columns:
-        """Derivatives of the response by the keys and initial states, shapes (n, p + 2) and (m, p + 2).
+        """Derivatives of the response by the keys and initial states, shapes (n s, p + states), (m s, p + states).
 
         Where the judging part has an initial state of its own it is known there: its columns are zero.
         """
@@ -64,27 +70,41 @@ class FittedResidual:
 
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
-        """Response of the free run on both parts: free of noise."""
-        fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0][:, 0]
-        return fitted, self.prediction.of(0).predicted
+        """Response of the free run on both parts, free of noise: shapes (n, s) and (m, s)."""
+        return run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0], self.prediction.predicted
 
-    @property
+    @cached_property
     def residual(self) -> tuple[Floats, Floats]:
-        """Measured less predicted response on both parts."""
-        return self.fit.residual, self.prediction.of(0).difference
+        """Measured less predicted response on both parts, shapes (n s,) and (m s,)."""
+        outputs = self.prepared.outputs
+        return outputs.stacked(self.fit.misfit), outputs.stacked(self.prediction.misfit)
 
     @property
     def both(self) -> Floats:
-        """The same strung together, shape (n + m,)."""
+        """The same strung together, shape (n s + m s,)."""
         return np.concatenate(self.residual)
 
     @cached_property
-    def beside_own(self) -> Floats:
-        """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take, (m,).
+    def sensors(self) -> "tuple[SensorResidual, ...]":
+        """What is left of each sensor."""
+        return tuple(SensorResidual(self, i) for i in range(len(self.prepared.outputs)))
 
-        A change of the prediction is held against this (``study.support.statistics.gain_beside``).
+    def of(self, channel: str) -> "SensorResidual":
+        """What is left of the sensor with this channel."""
+        return next(sensor for sensor in self.sensors if sensor.channel == channel)
+
+    @cached_property
+    def taking(self) -> tuple[Floats, Floats]:
+        """What makes of a column the amounts of ``own`` nearest to it: of the fitting part's, and of both parts'.
+
+        Shapes (p + states, n s) and (p + states, n s + m s).
         """
-        return self.residual[1] - self.own[1] @ least_squares(np.vstack(self.own), self.both, 1e-9)
+        return pseudo_inverse(self.own[0], 1e-9), pseudo_inverse(np.vstack(self.own), 1e-9)
+
+    @cached_property
+    def beside_own(self) -> Floats:
+        """Residual of both parts beside what the model's own coefficients, fitted to both, take, (n s + m s,)."""
+        return self.both - np.vstack(self.own) @ (self.taking[1] @ self.both)
 
     @property
     def spans(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -98,13 +118,8 @@ class FittedResidual:
 
     @property
     def size(self) -> float:
-        """Rms of the measured response on the judging part."""
-        return self.prediction.of(0).size
-
-    @property
-    def unit(self) -> str:
-        """Unit of the response."""
-        return self.prepared.record.units.get(self.prepared.response, "")
+        """Rms of the measured responses on the judging part, as they are stacked."""
+        return float(np.sqrt(np.mean((self.prediction.size * np.array(self.prepared.outputs.weights)) ** 2)))
 
     @property
     def relative_power(self) -> float:
@@ -115,6 +130,92 @@ class FittedResidual:
     def known(self, columns: Columns) -> Columns:
         """Columns on both parts, zero where samples are lost."""
         return self.prepared.known(columns[0], self.spans[0]), self.prepared.known(columns[1], self.spans[1])
+
+
+@dataclass(frozen=True, eq=False)
+class SensorResidual:
+    """What is left of one sensor, in its own unit; n and m samples."""
+
+    whole: FittedResidual
+    number: int  # of the sensor among those that are compared
+
+    @property
+    def prepared(self) -> Prepared:
+        """The record and its parts."""
+        return self.whole.prepared
+
+    @property
+    def sensor(self) -> Sensor:
+        """What it measures."""
+        return self.prepared.outputs.sensors[self.number]
+
+    @property
+    def channel(self) -> str:
+        """What is read of it."""
+        return str(self.sensor)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the channel."""
+        return self.prepared.record.units.get(self.channel, "")
+
+    @property
+    def predicted(self) -> tuple[Floats, Floats]:
+        """Its response in free run on both parts, shapes (n,) and (m,)."""
+        fitted, judged = self.whole.predicted
+        return fitted[:, self.number], judged[:, self.number]
+
+    @property
+    def residual(self) -> tuple[Floats, Floats]:
+        """Measured less predicted response on both parts, shapes (n,) and (m,)."""
+        return self.whole.fit.misfit[:, self.number], self.whole.prediction.misfit[:, self.number]
+
+    @property
+    def both(self) -> Floats:
+        """The same strung together, shape (n + m,)."""
+        return np.concatenate(self.residual)
+
+    @property
+    def size(self) -> float:
+        """Rms of the measured response on the judging part."""
+        return self.whole.prediction.of(self.number).size
+
+    @property
+    def samples(self) -> tuple[Ints, Ints]:
+        """Places of both parts in the record."""
+        return self.whole.samples
+
+    def kept(self, span: tuple[int, int]) -> Floats:
+        """1 for its samples along a span and 0 for those that are lost, shape (n,)."""
+        count = len(self.prepared.outputs)
+        return self.prepared.known(np.ones((span[1] - span[0]) * count), span)[self.number :: count]
+
+    def changed(self, change: Callable[[Floats], Floats]) -> Columns:
+        """A linear change of its response, shapes (n, 1) and (m, 1): of both parts at once where they follow."""
+        fitted, judged = self.predicted
+        if self.whole.spans[0][1] != self.whole.spans[1][0]:
+            return change(fitted)[:, None], change(judged)[:, None]
+        both = change(np.concatenate([fitted, judged]))[:, None]
+        return both[: len(fitted)], both[len(fitted) :]
+
+    @cached_property
+    def by_late_reading(self) -> Columns:
+        """Change of its response with each sample that it is read late, shapes (n, 1) and (m, 1)."""
+        dt = self.prepared.dt
+        return self.changed(lambda motion: -dt * derivative(motion, dt, 1))
+
+    def stacked(self, columns: Columns) -> Columns:
+        """Columns of this sensor, shapes (n, k) and (m, k), among those of all, which are zero: (n s, k), (m s, k)."""
+        outputs = self.prepared.outputs
+        if len(outputs) == 1:
+            return columns
+
+        def among(own: Floats) -> Floats:
+            found = np.zeros((len(own), len(outputs), own.shape[1]))
+            found[:, self.number] = own
+            return outputs.stacked(found)
+
+        return among(columns[0]), among(columns[1])
 
 
 def leftover(fit: FreeRunFit, prepared: Prepared) -> FittedResidual | None:
@@ -131,7 +232,8 @@ def refitted(fit: FreeRunFit, prepared: Prepared, without: str = "") -> FreeRunF
         return None
     model, anew = fit.model, fit.first != prepared.plan.fit[0]
     if without:
-        model, anew = model.without_term(without), anew or LIBRARY[without].state is not None
+        gone = next(entry.term for entry in model.terms if entry.name == without)
+        model, anew = model.without_term(without), anew or gone.state is not None
     held = [key for key in fit.held if key in model.values]
     initial = None if anew else np.atleast_2d(fit.initial)
     try:
@@ -171,41 +273,53 @@ def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Shar
     or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
-    taken = _taken(left.own[0], fitted)
+    taken = left.taking[0] @ fitted
     alone = fitted - left.own[0] @ taken
     if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
         return None
     change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
     whole, covariance = amounts_on_both(left, columns)
-    both = np.vstack(left.own)
-    apart = np.vstack([fitted, judged]) - both @ _taken(both, np.vstack([fitted, judged]))
-    power = float(np.mean((apart @ whole) ** 2)) / left.size**2
+    power = float(np.mean((_apart(left, columns) @ whole) ** 2)) / left.size**2
     count = 1 if leading else len(whole)
     wald = float(whole[:count] @ np.linalg.pinv(covariance[:count, :count], hermitian=True) @ whole[:count])
     freedom = 2 * BLOCKS - count  # the covariance rests on blocks: the test is Hotelling's, as these are few
     p_value = float(fdtrc(count, freedom, wald * freedom / (count * (2 * BLOCKS - 1))))
-    return Share(whole, covariance, p_value, gain_beside(left.residual[1], change, left.beside_own), power)
+    found = gain_beside(left.residual[1], change, left.beside_own[len(fitted) :])
+    return Share(whole, covariance, p_value, found, power)
 
 
-def _taken(own: Floats, columns: Floats) -> Floats:
-    """Amounts of the model's own sensitivities that come nearest to each column, shape (p, k)."""
-    return np.column_stack([least_squares(own, column, 1e-9) for column in columns.T])
+def gained(before: FittedResidual, after: FittedResidual) -> Gain:
+    """What a fit explains of what another leaves of the judging part."""
+    return gain(before.residual[1], _judged_as(before, after))
+
+
+def _judged_as(before: FittedResidual, after: FittedResidual) -> Floats:
+    """What a fit leaves of the judging part, (m s,), weighted as in another: a correction changes sizes."""
+    return before.prepared.outputs.stacked(after.prediction.misfit)
 
 
 def leaves_less(before: FittedResidual, after: FittedResidual, asked: int) -> bool:
     """Whether a fit leaves less of the judging part than another by no chance, so many having been tried."""
-    power = float(np.mean(before.residual[1] ** 2) - np.mean(after.residual[1] ** 2)) / before.size**2
-    held_out = gain(before.residual[1], after.residual[1])
+    less = _judged_as(before, after)
+    power = float(np.mean(before.residual[1] ** 2) - np.mean(less**2)) / before.size**2
+    held_out = gained(before, after)
     return held_out.p_value * asked < ALPHA and power > TOLERANCE**2
 
 
 def amounts_on_both(left: FittedResidual, columns: Columns) -> tuple[Floats, Floats]:
     """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
-    fitted, judged = left.known(columns)
-    count = fitted.shape[1]
-    design = np.vstack([np.hstack([left.own[0], fitted]), np.hstack([left.own[1], judged])])
-    amounts = least_squares(design, left.both, 1e-9)
-    return amounts[-count:], clustered_covariance(design, left.both - design @ amounts)[-count:, -count:]
+    apart, own = _apart(left, columns), left.taking[1]
+    amounts = least_squares(apart, left.both, 1e-9)
+    return amounts, clustered_covariance(apart, left.beside_own - apart @ amounts, len(own))
+
+
+def _apart(left: FittedResidual, columns: Columns) -> Floats:
+    """Columns on both parts less what the model's own coefficients, fitted to both, take of them, (n s + m s, k).
+
+    A regression on these has the amounts of one on all of them (Frisch and Waugh, 1933).
+    """
+    together = np.vstack(left.known(columns))
+    return together - np.vstack(left.own) @ (left.taking[1] @ together)
 
 
 def asks_for_more(left: FittedResidual) -> bool:
@@ -214,15 +328,16 @@ def asks_for_more(left: FittedResidual) -> bool:
     One free run with the sensitivities of all effects without shape parameters; where that fails nothing is ruled out.
     """
     fit, model, keys = left.fit, left.fit.model, list[str]()
-    for term in effects_but(model):
-        if not term.parameters:
-            model = model.with_term(ModelTerm(term, (0.0,) * len(term.components), ()))
-            keys += term.symbols
+    for entry in candidate_entries(model):
+        if not entry.parameters:
+            model = model.with_term(replace(entry, coefficients=(0.0,) * len(entry.symbols)))
+            keys += entry.symbols
     if not keys:
         return True
     extended = replace(fit, model=model, keys=tuple(keys), values=np.zeros(len(keys)))
     try:
-        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1][:, 0]
+        added = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1]
+        fitted = left.prepared.outputs.stacked(added)
         judged = left.run.derivatives(extended)[:, : len(keys)]
     except StudyError:
         return True
@@ -238,8 +353,10 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
+    if fit.model.named and len(fit.model.coordinates) == 1:  # the search knows one coordinate without a name alone
+        return None
     look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
-    entries = [free(term) for term in effects_but(fit.model)]
+    entries = candidate_entries(fit.model)
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
         base = shape_search.baseline(near, look)
@@ -279,4 +396,5 @@ def effects_beside(more: FittedResidual, left: FittedResidual) -> list[str]:
 def unphysical(more: FittedResidual, left: FittedResidual) -> bool:
     """Whether any of these is fitted outside of what makes it physical."""
     model, names = more.fit.model, effects_beside(more, left)
-    return any(e.term.physical(model.values) for e in model.terms if e.name in names)
+    added, values = [e for e in model.terms if e.name in names], model.values
+    return any(e.term.physical(dict(zip(e.term.keys, map(values.get, e.keys), strict=True))) for e in added)

@@ -14,6 +14,7 @@ from scipy.special import ndtr
 
 from study.faults.correction import corrected, fault_columns, sensible, unit_of
 from study.faults.fault import (
+    ALL_SENSORS,
     CLIPPING,
     DELAY,
     DRIFT,
@@ -25,13 +26,16 @@ from study.faults.fault import (
     OFFSET,
     SPIKES,
     Fault,
+    Held,
 )  # fmt: skip
 from study.faults.force_noise import force_noise
 from study.faults.leftover import (
+    Columns,
     FittedResidual,
     amounts_on_both,
     asks_for_more,
     effects_beside,
+    gained,
     leaves_less,
     left_again,
     leftover,
@@ -47,10 +51,11 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
-from study.support.statistics import gain
+from study.support.errors import expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
 SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
+Asked = tuple[str, str]  # a fault and the channel in which it is looked for
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
 EFFECTS = 3  # of the library that are added before a fault is believed
@@ -75,7 +80,8 @@ class SearchStage:
 
     def without(self, fault: Fault) -> "SearchStage | None":
         """The stage with one fault more corrected, or all spikes; None where a model does not run any more."""
-        known = (*(f for f in self.faults if not f.fault == fault.fault == SPIKES), fault)
+        again = [f for f in self.faults if f.fault == fault.fault == SPIKES and f.channel == fault.channel]
+        known = (*(f for f in self.faults if f not in again), fault)
         prepared = corrected(self.given, known)
         left, rich = (left_again(one, prepared) for one in (self.left, self.rich))
         if left is None or rich is None:
@@ -104,12 +110,55 @@ class Refined:
     left: FittedResidual
 
 
-def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[str]) -> tuple[Fault, ...]:
-    """Faults that the user gave values of, and those that the response shows by itself."""
-    name = prepared.response
-    unit = prepared.record.units.get(name, "")
-    given = [Fault(f, name, v, unit=unit_of(f, unit), held=True) for f, v in held.items()]
-    return (*given, *spotted(prepared, asked))
+def asked_of(prepared: Prepared, names: Sequence[str], held: Mapping[Asked, float]) -> tuple[Asked, ...]:
+    """Where faults of these names are looked for, but for those whose value is known.
+
+    In each sensor. Several sensors may all be late together, against all forces, and of several forces each by itself.
+    Noise on the only force is told from what the only sensor shows.
+    """
+    sensors, forces = [str(sensor) for sensor in prepared.outputs.sensors], prepared.record.forces
+    several = len(sensors) > 1
+    late = (ALL_SENSORS, *sensors, *(forces if len(forces) > 1 else ())) if several else sensors
+    where = {DELAY: late, FORCE_NOISE: () if several or len(forces) > 1 else forces}
+    everywhere = [(name, channel) for name in names for channel in where.get(name, sensors)]
+    return tuple(one for one in everywhere if one not in held)
+
+
+def held_in(prepared: Prepared, held: Held) -> dict[Asked, float]:
+    """The values that the user gave of faults, by fault and channel: where none is named, of the only sensor.
+
+    A delay is that of all sensors then.
+
+    Raises
+    ------
+    StudyError
+        If a record has no such channel, or of several sensors none is named.
+    """
+    sensors = [str(sensor) for sensor in prepared.outputs.sensors]
+    found: dict[Asked, float] = {}
+    for name, given in held.items():
+        channels = (*sensors, *(prepared.record.forces if name == DELAY else ()))
+        if isinstance(given, float | int):
+            expect(
+                len(sensors) == 1 or name == DELAY,
+                f"measurement holds {name} at {given:g} and there are several sensors; expected a value by channel, as "
+                f"'{name}: {{{sensors[0]}: {given:g}}}'",
+            )
+            found[name, sensors[0] if len(sensors) == 1 else ALL_SENSORS] = given
+            continue
+        for channel, value in given.items():
+            known = ", ".join(channels)
+            expect(channel in channels, f"measurement holds {name} of {channel!r}; expected one of {known}")
+            found[name, channel] = value
+    return found
+
+
+def first_faults(prepared: Prepared, held: Mapping[Asked, float], asked: Sequence[Asked]) -> tuple[Fault, ...]:
+    """Faults that the user gave values of, and those that the responses show by themselves."""
+    units = prepared.record.units
+    given = [Fault(f, c, v, unit=unit_of(f, units.get(c, "")), held=True) for (f, c), v in held.items()]
+    names = {str(s): [name for name, channel in asked if channel == str(s)] for s in prepared.outputs.sensors}
+    return (*given, *(fault for channel, own in names.items() for fault in spotted(prepared, channel, own)))
 
 
 def searched_part(given: Prepared) -> Prepared:
@@ -118,11 +167,11 @@ def searched_part(given: Prepared) -> Prepared:
 
 
 def search_faults(
-    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
+    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked]
 ) -> SearchEnd:  # fmt: skip
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
 
-    ``asked`` are the names that are looked for, ``fit`` is the model fitted to the record with the known faults
+    ``asked`` is what is looked for and where, ``fit`` is the model fitted to the record with the known faults
     corrected. Of a long record, faults that compete with physics are looked for in a stretch of either part; the
     others everywhere.
     """
@@ -132,7 +181,7 @@ def search_faults(
     if stage is not None and look is not given:
         known = tuple(f for f in stage.faults if f.fault not in PLAIN)
         left, rich = (refitted(one.fit, corrected(given, known)) for one in (stage.left, stage.rich))
-        plain = tuple(name for name in asked if name in PLAIN)
+        plain = tuple(one for one in asked if one[0] in PLAIN)
         stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
         stage = None if stage is None else _values_again(stage)
     if stage is None:
@@ -145,7 +194,7 @@ def _values_again(stage: SearchStage) -> SearchStage:
     for fault in stage.faults:
         if fault.fault in HOLDABLE and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
-            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
+            again = refined((fault.fault, fault.channel), stage.given, others, stage.rich, fault.value)
             if again is not None:
                 known = replace(again.fault, explained=fault.explained)
                 stage = replace(stage, faults=others).without(known) or stage
@@ -153,7 +202,7 @@ def _values_again(stage: SearchStage) -> SearchStage:
 
 
 def _searched(
-    given: Prepared, fit: FreeRunFit, rich: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
+    given: Prepared, fit: FreeRunFit, rich: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked]
 ) -> SearchStage | None:  # fmt: skip
     """Where a search ends; None where the model does not run. ``rich`` is the model with the effects known by now."""
     prepared = corrected(given, faults)
@@ -163,7 +212,7 @@ def _searched(
         return None
     stage = SearchStage(given, tuple(faults), left, more)
     if any(f.fault == CLIPPING for f in faults):  # noise may have kept samples within a limit that clips
-        wider = tuple(widened(f, given, left) if f.fault == CLIPPING else f for f in faults)
+        wider = tuple(widened(f, given, left.of(f.channel)) if f.fault == CLIPPING else f for f in faults)
         again = left_again(left, corrected(given, wider))
         stage = stage if again is None else SearchStage(given, wider, again, again)
     for _ in range(ROUNDS):
@@ -171,56 +220,61 @@ def _searched(
         if following is None:
             break
         stage = following
-    return _needed(stage, len(asked), [fault.fault for fault in faults])
+    return _needed(stage, len(asked), faults)
 
 
-def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
+def _next(stage: SearchStage, asked: Sequence[Asked]) -> SearchStage | None:
     """The stage with one fault more; None if there is none."""
-    found = [f.fault for f in stage.faults]
-    names = [name for name in asked if name not in found or name in (HUM, SPIKES)]
-    plain = _plain(stage, names, len(asked))
-    if plain is not None or set(asked) <= set(PLAIN):
+    found = [(f.fault, f.channel) for f in stage.faults]
+    open_ones = [one for one in asked if one not in found or one[0] in (HUM, SPIKES)]
+    plain = _plain(stage, open_ones, len(asked))
+    if plain is not None or all(name in PLAIN for name, _ in asked):
         return plain
-    return _contested(stage, [n for n in names if n not in [f.fault for f in stage.faults if f.rivals]], len(asked))
+    tied = [(f.fault, f.channel) for f in stage.faults if f.rivals]
+    return _contested(stage, [one for one in open_ones if one not in tied], len(asked))
 
 
-def _plain(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
+def _plain(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> SearchStage | None:
     """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
-    for name, looked_for in ((DROP_OUTS, drop_outs), (SPIKES, spikes), (DRIFT, drift)):
-        fault = looked_for(stage.rich, asked) if name in names else None
-        if fault is not None:
-            return stage.without(_merged(stage.faults, fault))
-    fault = hum(stage.rich, asked) if HUM in names else None
-    if fault is not None and is_of_the_mains(fault.frequency, stage.left):
-        return stage.without(fault)
+    for name, looked_for in ((DROP_OUTS, drop_outs), (SPIKES, spikes), (DRIFT, drift), (HUM, hum)):
+        for sensor in stage.rich.sensors:
+            fault = looked_for(sensor, asked) if (name, sensor.channel) in open_ones else None
+            if fault is not None and (name != HUM or is_of_the_mains(fault.frequency, sensor)):
+                return stage.without(_merged(stage.faults, fault))
     return None
 
 
 def _merged(faults: Sequence[Fault], more: Fault) -> Fault:
     """A fault with what was found of it before: spikes hide smaller ones."""
-    before = next((f for f in faults if f.fault == more.fault == SPIKES), None)
+    spiky = (f for f in faults if f.fault == more.fault == SPIKES and f.channel == more.channel)
+    before = next(spiky, None)
     if before is None or before.lost is None or more.lost is None:
         return more
     error = float(np.hypot(before.error, more.error))
     return replace(before, value=before.value + more.value, error=error, lost=before.lost | more.lost)
 
 
-def _contested(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
-    """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
-    name = _best(stage.rich, [n for n in names if n in (*HOLDABLE, HUM)], asked)
-    one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
+def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> SearchStage | None:
+    """One fault more of those that have a look-alike in the library, or one effect more that the record asks for.
+
+    A structure has many effects at many places: without a fault in sight, which sensors tell from effects where a
+    single one may not, none of them is searched for.
+    """
+    best = _best(stage.rich, [(n, channel) for n, channel in open_ones if n in (*HOLDABLE, HUM)], asked)
+    one = None if best is None else refined(best, stage.given, stage.faults, stage.rich)
     if one is not None and one.fault.error > 0.0:  # chance alone may give such a value, so many having been asked for
         t = abs(one.fault.value) / one.fault.error
         one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
     effect = None
-    if len(stage.effects) < EFFECTS and (one is not None or asks_for_more(stage.rich)):
+    alone = len(stage.rich.fit.model.coordinates) == 1
+    if len(stage.effects) < EFFECTS and (one is not None or (alone and asks_for_more(stage.rich))):
         effect = missing(stage.rich)
     if one is None:
-        return _noisy_force(stage, names, asked) if effect is None else _beside(effect, stage)
+        return _noisy_force(stage, open_ones, asked) if effect is None else _beside(effect, stage)
     if effect is None:
         return _accepted(stage, one)
     hums = one.fault.fault == HUM
-    columns = line(one.fault.frequency, effect) if hums else fault_columns(one.fault.fault, effect)
+    columns = _line(one.fault, effect) if hums else fault_columns(one.fault.fault, one.fault.channel, effect)
     fault_needed, both = share(effect, columns, leading=not hums), left_again(effect, one.left.prepared)
     needed = (
         fault_needed is not None and fault_needed.significant(asked),
@@ -233,9 +287,14 @@ def _contested(stage: SearchStage, names: Sequence[str], asked: int) -> SearchSt
     return _accepted(stage, one)
 
 
-def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
+def _line(fault: Fault, left: FittedResidual) -> Columns:
+    sensor = left.of(fault.channel)
+    return sensor.stacked(line(fault.frequency, sensor))
+
+
+def _noisy_force(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> SearchStage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if FORCE_NOISE not in names or force_noise(stage.rich, asked, repeats=1) is None:
+    if FORCE_NOISE not in [name for name, _ in open_ones] or force_noise(stage.rich, asked, repeats=1) is None:
         return None
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
@@ -246,19 +305,19 @@ def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> Search
     return replace(stage, faults=(*stage.faults, noise)) if effect is None else _beside(effect, stage)
 
 
-def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
+def _best(left: FittedResidual, open_ones: Sequence[Asked], asked: int) -> Asked | None:
     """The fault that explains most of what is left, and that not by chance; None without any."""
-    power: dict[str, float] = {}
-    for name in names:
+    power: dict[Asked, float] = {}
+    for name, channel in open_ones:
         if name == HUM:
-            fault = hum(left, asked)
+            fault = hum(left.of(channel), asked)
             if fault is not None:
-                power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
+                power[name, channel] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
-        found = share(left, fault_columns(name, left), leading=True)
+        found = share(left, fault_columns(name, channel, left), leading=True)
         if found is not None and found.significant(asked) and sensible(name, float(found.amounts[0]), left):
-            power[name] = found.power
-    return max(power, key=lambda name: power[name], default=None)
+            power[name, channel] = found.power
+    return max(power, key=lambda one: power[one], default=None)
 
 
 def _accepted(stage: SearchStage, one: Refined) -> SearchStage | None:
@@ -269,7 +328,8 @@ def _accepted(stage: SearchStage, one: Refined) -> SearchStage | None:
     following = stage.without(_explaining(one.fault, stage.rich, one.left))
     if following is None or len(following.effects) == len(stage.effects) or one.fault.fault == HUM:
         return following
-    again = refined(one.fault.fault, stage.given, stage.faults, following.rich, one.fault.value)
+    asked = one.fault.fault, one.fault.channel
+    again = refined(asked, stage.given, stage.faults, following.rich, one.fault.value)
     return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
 
 
@@ -279,7 +339,7 @@ def _beside(effect: FittedResidual, stage: SearchStage) -> SearchStage:
 
 
 def _explaining(fault: Fault, before: FittedResidual, after: FittedResidual) -> Fault:
-    return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
+    return replace(fault, explained=gained(before, after).explained)
 
 
 def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchStage | None:
@@ -289,7 +349,7 @@ def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchSta
     """
     if unphysical(effect, stage.rich) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
         return _accepted(stage, one)
-    if one.fault.fault == OFFSET and any(f.fault == DRIFT for f in stage.faults):
+    if one.fault.fault == OFFSET and any(f.fault == DRIFT and f.channel == one.fault.channel for f in stage.faults):
         return _accepted(stage, one)  # a channel that drifts has no zero of its own
     fault = replace(_explaining(one.fault, stage.rich, one.left), rivals=tuple(effects_beside(effect, stage.rich)))
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
@@ -298,12 +358,13 @@ def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchSta
 def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
     """Whether a harmonic force would have to be larger than the whole measured one."""
     values = effect.fit.model.numbers()
-    harmonic = [e.term.symbols for e in effect.fit.model.terms if len(e.term.symbols) == 2]  # a force of any phase
-    largest = float(np.max(np.abs(stage.given.record["force"][slice(*stage.given.plan.fit)])))
+    harmonic = [e.symbols for e in effect.fit.model.terms if len(e.symbols) == 2]  # a force of any phase
+    record = stage.given.record
+    largest = float(np.max(np.abs(record.columns(record.forces, stage.given.plan.fit))))
     return any(math.hypot(*(values[s] for s in symbols)) > largest for symbols in harmonic)
 
 
-def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage:
+def _needed(stage: SearchStage, asked: int, begun: Sequence[Fault]) -> SearchStage:
     """Without the faults that the effects found after them have made needless; ``begun`` were known from the start."""
     for fault in stage.faults:
         if fault.fault in (*HOLDABLE, DRIFT) and fault.corrected and not fault.held:
@@ -313,13 +374,14 @@ def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage
             if left is None or rich is None:
                 continue
             # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
-            lost = fault.fault in begun and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked)
+            known = (fault.fault, fault.channel) in [(f.fault, f.channel) for f in begun]
+            lost = known and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked)
             if lost:
                 continue
             if fault.fault == DRIFT:
-                seen = drift(rich, asked) is not None
+                seen = drift(rich.of(fault.channel), asked) is not None
             else:
-                needed = share(rich, fault_columns(fault.fault, rich), leading=True)
+                needed = share(rich, fault_columns(fault.fault, fault.channel, rich), leading=True)
                 seen = needed is not None and needed.significant(asked)
             if not seen:
                 stage = SearchStage(stage.given, others, left, rich)
@@ -327,26 +389,27 @@ def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage
 
 
 def refined(
-    name: str, given: Prepared, faults: Sequence[Fault], left: FittedResidual, value: float = 0.0
+    asked: Asked, given: Prepared, faults: Sequence[Fault], left: FittedResidual, value: float = 0.0
 ) -> Refined | None:  # fmt: skip
     """Search a fault's value by correcting the record, fitting the model again and correcting what is left of it.
 
     ``faults`` are those that ``left`` is corrected for already, besides this one with ``value``. None where the search
     leaves what is sensible, or the model does not run.
     """
+    name, channel = asked
     if name == HUM:
-        line = hum(left, 1)
+        line = hum(left.of(channel), 1)
         return None if line is None else _corrected(line, given, faults, left)
-    before = left
+    before, unit = left, unit_of(name, given.record.units.get(channel, ""))
     if name == DELAY and value == 0.0:
-        value, left = _coarse(given, faults, left)
+        value, left = _coarse(channel, given, faults, left)
     for _ in range(STEPS):
-        amounts, covariance = amounts_on_both(left, fault_columns(name, left, value))
+        amounts, covariance = amounts_on_both(left, fault_columns(name, channel, left, value))
         step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
         value += step
         if not sensible(name, value, left):
             return None
-        one = _corrected(Fault(name, given.response, value, error, unit_of(name, left.unit)), given, faults, left)
+        one = _corrected(Fault(name, channel, value, error, unit), given, faults, left)
         if one is None:
             return None
         left = one.left
@@ -354,21 +417,23 @@ def refined(
             break
     if left.relative_power >= before.relative_power:
         return None
-    explained = gain(before.residual[1], left.residual[1]).explained
+    explained = gained(before, left).explained
     found = one.fault  # pyright: ignore[reportPossiblyUnboundVariable]
     error = math.hypot(found.error, TOLERANCE * found.value)  # the model and its integration are no nearer than that
     return Refined(replace(found, explained=explained, error=error), left)
 
 
-def _coarse(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> tuple[float, FittedResidual]:
+def _coarse(
+    channel: str, given: Prepared, faults: Sequence[Fault], left: FittedResidual
+) -> tuple[float, FittedResidual]:  # fmt: skip
     """Where the search for a delay begins: at zero, or at the best of some whole samples if it is more than a part.
 
     A model that is fitted to a record late by a good part of a period finds a minimum of its own.
     """
-    step = float(amounts_on_both(left, fault_columns(DELAY, left))[0][0])
+    step = float(amounts_on_both(left, fault_columns(DELAY, channel, left))[0][0])
     best = 0.0, left
     for late in FAR_APART if abs(step) > 0.5 else ():
-        tried = left_again(left, corrected(given, (*faults, Fault(DELAY, given.response, late))))
+        tried = left_again(left, corrected(given, (*faults, Fault(DELAY, channel, late))))
         if tried is not None and tried.relative_power < best[1].relative_power:
             best = late, tried
     return best
@@ -381,7 +446,8 @@ def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: Fit
         return None if again is None else Refined(fault, again)
     # What a coupling has taken away below its cut-off cannot come back: only noise would.
     length = len(given.record) * given.dt
-    slow = slow_part(again, int(np.ceil(2.0 * fault.value * length)))
-    whole = replace(fault, waveform=slow + float(np.mean(again.both)))
+    sensor = again.of(fault.channel)
+    slow = slow_part(sensor, int(np.ceil(2.0 * fault.value * length)))
+    whole = replace(fault, waveform=slow + float(np.mean(sensor.both)))
     final = left_again(again, corrected(given, (*faults, whole)))
     return None if final is None else Refined(whole, final)

@@ -12,10 +12,10 @@ from scipy.fft import dct, idct, rfft
 from scipy.special import fdtrc, stdtr
 
 from study.faults.fault import DRIFT, HUM, SPIKES, Fault
-from study.faults.leftover import Columns, FittedResidual, share
+from study.faults.leftover import Columns, SensorResidual, share
 from study.identify.time_domain.part_fit import run_of
-from study.records.outputs import alone
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import Prepared
+from study.records.record import Sensor
 from study.support.arrays import Bools, Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -30,7 +30,7 @@ NEIGHBOURS = 8  # samples on either side that tell how much a sample differs fro
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
-def drift(left: FittedResidual, asked: int) -> Fault | None:
+def drift(left: SensorResidual, asked: int) -> Fault | None:
     """A drift of the response, None where the slowest lines hold no more than those beside them.
 
     The F test of both groups of lines, of which a smooth spectrum makes independent numbers of one variance.
@@ -47,27 +47,28 @@ def drift(left: FittedResidual, asked: int) -> Fault | None:
     waveform = slow_part(left, count)
     explained = 1.0 - float(np.sum((residual - waveform[places]) ** 2) / np.sum(residual**2))
     error = float(np.sqrt(noise / len(residual)))
-    return Fault(DRIFT, left.prepared.response, float(np.sqrt(power)), error, left.unit, explained, waveform)
+    return Fault(DRIFT, left.channel, float(np.sqrt(power)), error, left.unit, explained, waveform)
 
 
-def slow_response(prepared: Prepared, asked: int) -> Fault | None:
-    """The slowest lines of the response itself, where they hold more than those beside them and the force's do not.
+def slow_response(prepared: Prepared, channel: str, asked: int) -> Fault | None:
+    """The slowest lines of a response itself, where they hold more than those beside them and those of no force do.
 
     A drift larger than the motion takes the coefficients with it: a mass almost without a spring follows any ramp. What
     is said of it here, the mean included, is no more than where a fit that does not follow it may begin.
     """
     places = np.unique(np.concatenate([np.arange(*span) for span in (prepared.plan.fit, prepared.plan.judge)]))
-    values, force = (prepared.record[name][places] for name in (prepared.response, FORCE))
-    if _slow_lines(values, asked) is None or _slow_lines(force, asked) is not None:
+    values, *forces = (prepared.record[name][places] for name in (channel, *prepared.record.forces))
+    if _slow_lines(values, asked) is None or any(_slow_lines(force, asked) is not None for force in forces):
         return None
     waveform = _slow(places, values, SLOWEST, len(prepared.record)) + np.mean(values)
-    return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
+    return Fault(DRIFT, channel, float(np.std(waveform)), waveform=waveform)
 
 
-def mean_response(prepared: Prepared) -> Fault:
-    """The mean of the response, where a fit that cannot follow it may begin; as a drift that stays the same."""
-    mean = float(np.mean(np.concatenate([prepared.fitted, prepared.judged])))
-    return Fault(DRIFT, prepared.response, mean, waveform=np.full(len(prepared.record), mean))
+def mean_response(prepared: Prepared, channel: str) -> Fault:
+    """The mean of a response, where a fit that cannot follow it may begin; as a drift that stays the same."""
+    values, plan = prepared.record[channel], prepared.plan
+    mean = float(np.mean(np.concatenate([values[slice(*plan.fit)], values[slice(*plan.judge)]])))
+    return Fault(DRIFT, channel, mean, waveform=np.full(len(prepared.record), mean))
 
 
 def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
@@ -83,7 +84,7 @@ def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     return count, float(np.mean(lines[count + 1 : 3 * count + SLOWEST + 1] ** 2))
 
 
-def slow_part(left: FittedResidual, count: int) -> Floats:
+def slow_part(left: SensorResidual, count: int) -> Floats:
     """The ``count`` slowest cosines of a residual along the whole record, without their mean, shape (n,)."""
     return _slow(*_in_time(left), count, len(left.prepared.record))
 
@@ -96,7 +97,7 @@ def _slow(places: Ints, values: Floats, count: int, length: int) -> Floats:
     return np.pad(np.asarray(idct(lines, norm="ortho"), dtype=np.float64), (first, length - 1 - last), "edge")
 
 
-def _in_time(left: FittedResidual) -> tuple[Ints, Floats]:
+def _in_time(left: SensorResidual) -> tuple[Ints, Floats]:
     """Places and residual of both parts in the order of time."""
     places = np.concatenate(left.samples)
     order = np.argsort(places)
@@ -110,13 +111,13 @@ def _p_value(lines: Floats, first: int, last: int, beside: int) -> float:
     return float(fdtrc(len(own), len(next_to), float(np.mean(own)) / level)) if level > 0.0 else 1.0
 
 
-def hum(left: FittedResidual, asked: int) -> Fault | None:
+def hum(left: SensorResidual, asked: int) -> Fault | None:
     """The strongest line of the residual, None where none stands out of its neighbours by more than chance."""
     frequency = _strongest_line(left, ALPHA / asked)
     if frequency is None:
         return None
     frequency = _refined(frequency, left)
-    found = share(left, line(frequency, left))
+    found = share(left.whole, left.stacked(line(frequency, left)))
     if found is None or not found.significant(asked):
         return None
     amplitude = float(np.hypot(*found.amounts))
@@ -124,11 +125,10 @@ def hum(left: FittedResidual, asked: int) -> Fault | None:
     error = float(np.sqrt(max(direction @ found.covariance @ direction, 0.0)))
     turn = 2.0 * np.pi * frequency * left.prepared.dt * np.arange(len(left.prepared.record))
     waveform = found.amounts[0] * np.cos(turn) + found.amounts[1] * np.sin(turn)
-    explained, response = found.gain.explained, left.prepared.response
-    return Fault(HUM, response, amplitude, error, left.unit, explained, waveform, frequency=frequency)
+    return Fault(HUM, left.channel, amplitude, error, left.unit, found.gain.explained, waveform, frequency=frequency)
 
 
-def is_of_the_mains(frequency: float, left: FittedResidual) -> bool:
+def is_of_the_mains(frequency: float, left: SensorResidual) -> bool:
     """Whether a frequency is that of the mains or a multiple, or what the sampling makes of these, to a line."""
     dt = left.prepared.dt
     resolution = 1.0 / (dt * len(left.both))
@@ -139,14 +139,14 @@ def is_of_the_mains(frequency: float, left: FittedResidual) -> bool:
     return False
 
 
-def line(frequency: float, left: FittedResidual) -> Columns:
+def line(frequency: float, left: SensorResidual) -> Columns:
     """Cosine and sine on both parts."""
     turns = [2.0 * np.pi * frequency * left.prepared.dt * places for places in left.samples]
     first, second = (np.column_stack([np.cos(turn), np.sin(turn)]) for turn in turns)
     return first, second
 
 
-def _strongest_line(left: FittedResidual, level: float) -> float | None:
+def _strongest_line(left: SensorResidual, level: float) -> float | None:
     """Frequency in hertz of the line that stands highest over its neighbours, by the F test of all lines."""
     residual = left.both
     n = len(residual)
@@ -166,7 +166,7 @@ def _strongest_line(left: FittedResidual, level: float) -> float | None:
     return best / (n * left.prepared.dt) if p_value < level else None
 
 
-def _refined(frequency: float, left: FittedResidual) -> float:
+def _refined(frequency: float, left: SensorResidual) -> float:
     """The frequency at which the line takes most of both parts, within a line to either side."""
     resolution = 1.0 / (left.prepared.dt * len(left.both))
     places, residual = np.concatenate(left.samples), left.both
@@ -178,12 +178,11 @@ def _refined(frequency: float, left: FittedResidual) -> float:
     return frequency
 
 
-def spikes(left: FittedResidual, asked: int) -> Fault | None:
+def spikes(left: SensorResidual, asked: int) -> Fault | None:
     """Spikes on both parts of the record, None without any."""
-    record, prepared = left.prepared.record, left.prepared
-    lost = np.zeros(len(record), dtype=bool)
-    for span, residual, reversed_ in zip(left.spans, left.residual, _reversals(left), strict=True):
-        known = (prepared.known(np.ones(len(residual)), span) > 0.0) & ~reversed_
+    lost = np.zeros(len(left.prepared.record), dtype=bool)
+    for span, residual, reversed_ in zip(left.whole.spans, left.residual, _reversals(left), strict=True):
+        known = (left.kept(span) > 0.0) & ~reversed_
         lost[slice(*span)] = _isolated(residual, known, ALPHA / asked)
     if not np.any(lost):
         return None
@@ -194,24 +193,27 @@ def spikes(left: FittedResidual, asked: int) -> Fault | None:
     count = float(np.mean(lost[places]))
     beside = lost | np.roll(lost, 1) | np.roll(lost, -1)  # another spike there could not be told from this one
     error = float(np.sqrt(count / len(places)))  # of a count: small ones cannot be told from noise
-    return Fault(SPIKES, prepared.response, count, error, "1", explained, lost=beside)
+    return Fault(SPIKES, left.channel, count, error, "1", explained, lost=beside)
 
 
-def _reversals(left: FittedResidual) -> tuple[Bools, Bools]:
+def _reversals(left: SensorResidual) -> tuple[Bools, Bools]:
     """Samples beside which dry friction makes the acceleration jump, on both parts; none of another response.
 
     An error of the model moves such a jump past a sample, which then stands alone as a spike does.
     """
-    jumps = any("sgn(v)" in c.shape for entry in left.fit.model.terms for c in entry.term.components)
-    if left.prepared.response != "acceleration" or not jumps:
+    fit, run = left.whole.fit, left.whole.run
+    rough = [e.place for e in fit.model.terms if any("sgn(v)" in c.shape for c in e.term.components)]
+    if left.sensor.motion != "acceleration" or not rough:
         return np.zeros(len(left.residual[0]), bool), np.zeros(len(left.residual[1]), bool)
-    fitted = run_of(left.fit, left.prepared, sensors=alone("velocity").sensors).respond({}, left.fit.initial)[0][:, 0]
-    return _turning(fitted), _turning(left.run.motion("velocity"))
+    velocities = [Sensor(coordinate, "velocity") for coordinate in fit.model.coordinates]
+    directions = np.column_stack([place.direction(fit.model.coordinates) for place in rough])
+    fitted = run_of(fit, left.prepared, sensors=velocities).respond({}, fit.initial)[0]
+    return _turning(fitted @ directions), _turning(run.motions(velocities) @ directions)
 
 
 def _turning(velocity: Floats) -> Bools:
-    """Samples on either side of a change of sign, shape (n,)."""
-    turns = np.diff(np.sign(velocity)) != 0.0
+    """Samples on either side of a change of sign of any velocity, shapes (n, places) and (n,)."""
+    turns = np.any(np.diff(np.sign(velocity), axis=0) != 0.0, axis=1)
     return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 

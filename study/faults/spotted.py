@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
-from study.faults.leftover import FittedResidual
+from study.faults.leftover import SensorResidual
 from study.records.plan import moving
 from study.records.prepared import Prepared
 from study.support.arrays import Bools, Floats, Ints
@@ -24,10 +24,9 @@ RUN = 3  # samples in a row with the same value: a channel that counts in no ste
 STANDING = 0.05  # of the samples: a channel that stands still longer is at rest, and has not dropped out
 
 
-def spotted(prepared: Prepared, asked: Sequence[str]) -> tuple[Fault, ...]:
-    """Clipping and steps of the converter, where the measured response shows them and they are asked for."""
-    values, name = prepared.record[prepared.response], prepared.response
-    unit = prepared.record.units.get(name, "")
+def spotted(prepared: Prepared, name: str, asked: Sequence[str]) -> tuple[Fault, ...]:
+    """Clipping and steps of the converter, where a measured response shows them and they are asked for."""
+    values, unit = prepared.record[name], prepared.record.units.get(name, "")
     found: list[Fault] = []
     step = converter_step(values)
     if step is not None and CONVERTER_STEPS in asked:
@@ -80,14 +79,14 @@ def _recurs(values: Floats, mask: Bools, limit: float, step: float | None) -> bo
     return count > beside + 5.0 * math.sqrt(beside + count)
 
 
-def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
+def drop_outs(left: SensorResidual, asked: int) -> Fault | None:
     """Samples in runs of one value, which noise does not repeat; None without any.
 
     A system at rest, as one that friction holds, stands still too. Without noise a run counts where the model says that
     the motion went on, by the F test of what is left there against what is left elsewhere, each run a single number. Of
     a channel that counts in steps nothing can be said.
     """
-    prepared, values = left.prepared, left.prepared.record[left.prepared.response]
+    values = left.prepared.record[left.channel]
     if converter_step(values) is not None:
         return None
     places = np.concatenate(left.samples)
@@ -101,7 +100,7 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     if not 0.0 < float(np.mean(mask[places])) < STANDING:
         return None
     noisy = _noise(left.both) > TOLERANCE * left.size
-    if prepared.response != "displacement" and not np.any(values[mask]):  # what a system that friction holds shows
+    if left.sensor.motion != "displacement" and not np.any(values[mask]):  # what a system that friction holds shows
         mask = _moving(mask, places, power, ALPHA / (asked * runs), noisy)
     there = mask[places]
     if not np.any(there):
@@ -111,7 +110,7 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     if not noisy and float(fdtrc(runs, len(power), ratio)) * asked >= ALPHA:
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
-    return Fault(DROP_OUTS, prepared.response, float(np.mean(there)), unit="1", explained=explained, lost=mask)
+    return Fault(DROP_OUTS, left.channel, float(np.mean(there)), unit="1", explained=explained, lost=mask)
 
 
 def _moving(mask: Bools, places: Ints, power: Floats, level: float, noisy: bool) -> Bools:
@@ -143,14 +142,14 @@ def _standing(values: Floats) -> tuple[Bools, int]:
     return mask, count
 
 
-def widened(fault: Fault, given: Prepared, left: FittedResidual) -> Fault:
+def widened(fault: Fault, given: Prepared, left: SensorResidual) -> Fault:
     """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
 
     Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not
     have zero mean, and the coefficients a bias. What was read far from the limit was not clipped, wherever the free run
     of a model that lacks something goes.
     """
-    values = given.record[given.response]
+    values = given.record[left.channel]
     clipped = at_the_limits(values, converter_step(values))
     if clipped is None:
         return fault
@@ -159,7 +158,7 @@ def widened(fault: Fault, given: Prepared, left: FittedResidual) -> Fault:
     margin = MARGIN * min(_noise(left.both), _noise(values))
     for limit in np.unique(values[clipped]).tolist():
         sign = 1.0 if limit > float(np.mean(values)) else -1.0
-        for span, predicted in zip(left.spans, left.predicted, strict=True):
+        for span, predicted in zip(left.whole.spans, left.predicted, strict=True):
             near = sign * (values[slice(*span)] - limit) > -3.0 * margin
             lost[slice(*span)] |= near & (sign * (predicted - limit) > -margin)
     return replace(fault, lost=lost)

@@ -18,6 +18,7 @@ from study.support.files import replace_file
 if TYPE_CHECKING:
     import pandas as pd
 
+    from study.faults.fault import Given
     from study.interface.fitted import Fit
 
 Samples = tuple[int, int | None]  # the first, and the one after the last
@@ -269,7 +270,7 @@ class Model:
         self, record: "Record | Sequence[Record]", *, fit: Samples | None = None,
         judge: 'Samples | Literal["every-other-block"] | None' = None, use: Sequence[Times] = (),
         response: str | None = None, cutoff: float | None = None, estimator: str = "output_error",
-        measurement: Mapping[str, float | None] | bool | None = None, as_sampled: bool = False,
+        measurement: "Given | bool | None" = None, as_sampled: bool = False,
         absolute: bool = False, each_record: Sequence[str] = (),
     ) -> "Fit":  # fmt: skip
         """Fit what the model leaves open to one part of a record, and judge it on the other.
@@ -297,8 +298,8 @@ class Model:
         estimator : str
             What finds the coefficients: the fit in free run, or one of :func:`identify`.
         measurement : mapping, or False
-            Faults of the measurement: False to look for none; by name a value that is known, or None for one that is
-            not to be looked for. If left out, what stands beside the record's file.
+            Faults of the measurement: False to look for none; by name a value that is known, or values by channel, or
+            None for one that is not to be looked for. If left out, what stands beside the record's file.
         as_sampled : bool
             Use all samples of a driven response, though its motion asks for fewer; they always are used of free
             decays, components, motions without a spring, and of stretches that are named.

@@ -14,7 +14,7 @@ from study.compare.fitted_coefficients import Coefficient
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
-from study.faults.fault import Fault, settings_asked
+from study.faults.fault import Fault, Given, settings_asked
 from study.interface.data import Record
 from study.interface.equation import Model, Samples, Times
 from study.interface.forces import Force, simulate
@@ -334,7 +334,7 @@ class Fit(FitPictures):
 def fitted(
     model: Model, record: Record | Sequence[Record], *, fit: Samples | None,
     judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
-    cutoff: float | None, estimator: str, measurement: Mapping[str, float | None] | bool | None, as_sampled: bool,
+    cutoff: float | None, estimator: str, measurement: Given | bool | None, as_sampled: bool,
     absolute: bool, each_record: Sequence[str],
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.records.record import ALONE, Record, Sensor
-from study.support.arrays import Floats
+from study.support.arrays import Bools, Floats
 from study.support.autoregression import whitened
 
 Noise = tuple[Floats, ...]  # autoregressive coefficients of each sensor's noise, the first of which weighs it
@@ -36,6 +36,14 @@ class Outputs:
             return values[:, 0]
         weights = np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
         return (values * weights).reshape(-1, *values.shape[2:])
+
+    def kept(self, lost: Bools) -> Floats:
+        """1 for stacked values that count and 0 for those of lost samples, shape (n s,).
+
+        ``lost`` has a column for each sensor, or is (n,) where a sample of all is lost together.
+        """
+        each = lost if lost.ndim == 2 else lost[:, None]
+        return (~np.broadcast_to(each, (len(lost), len(self.sensors)))).ravel().astype(np.float64)
 
     def apart(self, stacked: Floats) -> Floats:
         """The inverse of :meth:`stacked`: shape (n, sensors, ...), in the units of the sensors."""

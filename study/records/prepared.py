@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records.completion import complete
 from study.records.outputs import Outputs
 from study.records.plan import FEWEST, Plan, compared_sensors, make_plan
 from study.records.record import ALONE, FORCE, Record, Sensor
-from study.support.arrays import Floats
+from study.support.arrays import Bools, Floats
 
 QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
@@ -29,7 +28,8 @@ class Prepared:
     edge: int  # samples at each end that derivatives and integrals leave uncertain
     notes: tuple[str, ...] = ()  # what was converted or computed, a sentence each
     low: float = 0.0  # frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0
-    lost: NDArray[np.bool_] | None = None  # (n,): samples that say nothing, as clipped ones do: not fitted, not judged
+    # Samples that say nothing, as clipped ones do, and are neither fitted nor judged: (n, s), or (n,) of all sensors.
+    lost: Bools | None = None
     every: int = 1  # how many samples there were to one of this (:mod:`study.records.sampling_rate`)
     as_sampled: "Prepared | None" = None  # the record with all of its samples, where this has fewer
     running_on: "Prepared | None" = None  # with motions that run on, where here they begin anew (``apart``)
@@ -96,7 +96,7 @@ class Prepared:
         """Stacked values along a span, zero where a sensor's sample is lost, the same shape."""
         if self.lost is None:
             return values
-        kept = ~np.repeat(self.lost[slice(*span)], len(self.outputs))
+        kept = self.outputs.kept(self.lost[slice(*span)])
         return values * (kept if values.ndim == 1 else kept[:, None])
 
     def inner(self, span: tuple[int, int]) -> tuple[int, int]:

@@ -27,6 +27,15 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -
     return amounts / scale
 
 
+def pseudo_inverse(columns: Floats, cutoff: float = INDISTINCT) -> Floats:
+    """What makes of any target the amounts that :func:`least_squares` gives, shape (columns, samples)."""
+    scale = length_or_one(columns)
+    left, size, right = np.linalg.svd(columns / scale, full_matrices=False)
+    kept = size > cutoff * np.max(size, initial=0.0)
+    inverse: Floats = (right[kept].T / size[kept]) @ left[:, kept].T / scale[:, None]
+    return inverse
+
+
 def influence(design: Complexes, weight: Floats) -> Complexes:
     """How the lines of a complex target move its real coefficients: these are ``Re(influence @ target)``.
 

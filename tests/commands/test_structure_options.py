@@ -134,13 +134,23 @@ def test_a_diagnosis_of_a_structure_refuses_each_record(folder, capsys):
     assert "--each-record is for 'study compare' where the model has 'coordinates'" in capsys.readouterr().err
 
 
-def test_a_fault_that_is_held_beside_a_structure_is_refused(folder, capsys, tmp_path):
+def test_a_fault_that_is_held_beside_a_structure_is_that_of_its_channel(folder, capsys, tmp_path):
     (tmp_path / "b.csv").write_bytes((folder / "b.csv").read_bytes())
-    (tmp_path / "b.record.yaml").write_text("measurement: {delay: 0.5}\n")
     words = ["compare", str(tmp_path / "b.csv"), "--model", str(folder / "pair.yaml"), "--out", str(tmp_path / "out")]
+    (tmp_path / "b.record.yaml").write_text("measurement: {offset: {b displacement: 0.25}, delay: off}\n")
+    assert main(words) == 0
+    held, *_ = document(tmp_path / "out" / "comparison.json")["measurement"]
+    assert (held["fault"], held["channel"], held["value"], held["corrected"]) == (
+        "offset",
+        "b displacement",
+        0.25,
+        True,
+    )
+    (tmp_path / "b.record.yaml").write_text("measurement: {offset: 0.25}\n")
     assert main(words) == 2
-    assert "measurement holds delay, which is looked for in records of a single mass alone" in capsys.readouterr().err
+    assert "there are several sensors; expected a value by channel" in capsys.readouterr().err
     assert main([*words, "--no-measurement"]) == 0
+    assert document(tmp_path / "out" / "comparison.json")["measurement"] == []
 
 
 def test_blocks_in_turn_and_parts_are_what_is_asked_for(folder, capsys):

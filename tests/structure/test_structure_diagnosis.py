@@ -8,9 +8,10 @@ import pytest
 
 from study.cli import main
 from study.compare.comparison import compare
-from study.diagnose.candidates import candidate_entries, screened
+from study.diagnose.candidates import screened
 from study.diagnose.verdict import search_base
 from study.equations.model_file import format_model, read_model
+from study.equations.possible_effects import candidate_entries
 from study.equations.terms import external, get, one_sided
 from study.records.prepared import prepare_record
 from study.records.record import write_csv

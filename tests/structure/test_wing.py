@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from study.compare.comparison import compare
-from study.diagnose.candidates import candidate_entries, screened
+from study.diagnose.candidates import screened
 from study.diagnose.verdict import MISSING, UNKNOWN, diagnose, search_base
 from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
+from study.equations.possible_effects import candidate_entries
 from study.equations.terms import LIBRARY, get
 from study.records.plan import make_plan
 from study.records.prepared import prepare_record

@@ -10,7 +10,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.linear_part import is_positive
@@ -20,7 +19,7 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import Record
 from study.records.states import starting_states
-from study.support.arrays import Floats
+from study.support.arrays import Bools, Floats
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, ContinuityGaps, End, Point, minimise, point_at
 
@@ -147,7 +146,7 @@ def fit_free_run(
     continuity: float = 0.0,
     offset: float = OFFSET,
     noise: tuple[Floats, ...] = (),
-    lost: NDArray[np.bool_] | None = None,
+    lost: Bools | None = None,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -176,7 +175,7 @@ def fit_free_run(
     noise : tuple of arrays, shape (order + 1,)
         Autoregressive coefficients of each sensor's noise, as :func:`study.support.autoregression.autoregression` gives
         them; the residual filtered with them is minimised. White noise by default, and wherever there are restarts.
-    lost : bool array, shape (samples of the record,), optional
+    lost : bool array, shape (samples of the record,) or (samples of the record, s), optional
         Samples that say nothing: their residual counts as zero.
 
     Raises
@@ -210,7 +209,7 @@ def fit_free_run(
         states[:, : run.moving] = shown[:, : run.moving]
     measured = outputs.stacked(outputs.measured(record, (first, first + run.samples)))
     positive = {key: FAR * begin[key] for entry in model.terms for key in entry.positive if key in begin}
-    kept = None if lost is None else np.repeat(~lost[first : first + run.samples], len(outputs)).astype(np.float64)
+    kept = None if lost is None else outputs.kept(lost[first : first + run.samples])
     coupled = any(t.term.name == "inertia" and t.place.kind != "at" and set(t.keys) & set(begin) for t in model.terms)
     weights = _weights(continuity, measured, states)
     problem = _Problem(

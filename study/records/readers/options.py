@@ -31,8 +31,9 @@ class ReadOptions:
     period: int | None = None  # samples in one period of a periodic excitation
     accept_saturated: bool = False  # a channel that rests at its extreme value is like that (a trapezoidal force, say)
     accept_swapped: bool = False  # force and response are as named, though they seem exchanged
-    # Faults of the measurement by name: a value that is known, None for one not to be looked for; empty for none.
-    measurement: Mapping[str, float | None] | None = None
+    # Faults of the measurement by name: a value that is known, or those of some channels, None for one not to be looked
+    # for; empty for none.
+    measurement: Mapping[str, float | Mapping[str, float] | None] | None = None
     free: bool = False  # no force acts: a free decay
     as_sampled: bool = False  # all samples are used, though the motion asks for fewer
 
@@ -109,7 +110,7 @@ def read_options(path: Path) -> ReadOptions:
         )
 
 
-def _measurement(given: Mapping[object, object]) -> dict[str, float | None] | None:
+def _measurement(given: Mapping[object, object]) -> dict[str, float | Mapping[str, float] | None] | None:
     content = given.get("measurement")
     if content is None or content is True or content == "on":
         return None
@@ -118,13 +119,23 @@ def _measurement(given: Mapping[object, object]) -> dict[str, float | None] | No
     faults, wanted = as_mapping(content), "'off', or a mapping such as '{delay: 0.5, drift: off}'"
     if not faults:
         raise _wrong("measurement", content, wanted)
-    held = dict[str, float | None]()
+    held = dict[str, float | Mapping[str, float] | None]()
     for key, value in faults.items():
-        name = _text("a fault in measurement", key)
-        number = held[name] = _number(f"{key} in measurement", value) if type(value) in (int, float) else None
-        if not (value is False or value == "off" or (number is not None and math.isfinite(number))):
-            raise _wrong(f"{key} in measurement", value, "a number, or 'off'")
+        name, channels = _text("a fault in measurement", key), as_mapping(value)
+        if channels:
+            each = {_text(f"a channel of {key} in measurement", c): v for c, v in channels.items()}
+            held[name] = {c: _known(f"{key} of {c} in measurement", v, "a number") for c, v in each.items()}
+        else:
+            off = value is False or value == "off"
+            held[name] = None if off else _known(f"{key} in measurement", value, "a number, or 'off'")
     return held
+
+
+def _known(name: str, value: object, expected: str) -> float:
+    number = _number(name, value) if type(value) in (int, float) else None
+    if number is None or not math.isfinite(number):
+        raise _wrong(name, value, expected)
+    return number
 
 
 def _mapping(given: Mapping[object, object], key: str) -> dict[str, object]:
