@@ -17,14 +17,11 @@ TRUE = st.Model(
     st.term("inertia", value=1.0), st.term("linear_damping", value=0.6), st.term("linear_stiffness", value=355.3),
     st.term("cubic_stiffness", value=2e6), name="truth",
 )  # fmt: skip
-STRUCTURE = """name: pair
+MODAL = """name: pair
 coordinates: [a, b]
 forces: {shaker: a}
-terms:
-  - {term: inertia, at: a}
-  - {term: inertia, at: b}
-  - {term: linear_stiffness, between: [ground, a]}
-  - {term: linear_stiffness, between: [a, b]}
+linear: modal
+terms: []
 """
 
 
@@ -167,7 +164,7 @@ def test_two_fits_are_compared_in_a_list_or_side_by_side(levels: list[st.Record]
 
 
 def test_wrong_use_is_one_sentence(levels: list[st.Record], tmp_path: Path) -> None:
-    (tmp_path / "pair.yaml").write_text(STRUCTURE)
+    (tmp_path / "pair.yaml").write_text(MODAL)
     record, decay = levels[0], decays(0.02)
     part = st.Model("linear_stiffness", name="part")
     fit = LINEAR.fit(record, measurement=False)
@@ -197,7 +194,7 @@ def test_wrong_use_is_one_sentence(levels: list[st.Record], tmp_path: Path) -> N
         (lambda: st.compare(fit, LINEAR), "is no fit; expected what a model's fit(record) gives"),
         (lambda: st.compare(1), "1 is no fit"),
         (lambda: fit.across([record, "low.csv"]), "'low.csv' is no record"),
-        (lambda: st.Model.load(tmp_path / "pair.yaml"), "a structure with the coordinates a, b, which 'study compare'"),
+        (lambda: st.Model.load(tmp_path / "pair.yaml"), "'linear: modal' is for 'study compare'"),
     ]  # fmt: skip
     for use, sentence in cases:
         with pytest.raises(st.StudyError) as caught:
