@@ -212,8 +212,12 @@ def _reversals(left: SensorResidual) -> tuple[Bools, Bools]:
 
 
 def _turning(velocity: Floats) -> Bools:
-    """Samples on either side of a change of sign of any velocity, shapes (n, places) and (n,)."""
-    turns = np.any(np.diff(np.sign(velocity), axis=0) != 0.0, axis=1)
+    """Samples on either side of a change of sign of any velocity, shapes (n, places) and (n,).
+
+    What rounding leaves of a velocity that friction holds is none: it would hide where the rest begins.
+    """
+    held = np.abs(velocity) <= np.finfo(float).eps * np.max(np.abs(velocity), axis=0)
+    turns = np.any(np.diff(np.where(held, 0.0, np.sign(velocity)), axis=0) != 0.0, axis=1)
     return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 

@@ -6,6 +6,7 @@ import pytest
 from study import trials
 from study.faults.accounting import accounted
 from study.faults.imposed import impose, shifted
+from study.faults.seen_in_residual import _turning
 from study.records.prepared import prepare_record
 from study.trials import DRIVEN_MASS
 
@@ -120,3 +121,10 @@ def test_a_record_that_is_over_in_its_middle_has_lost_nothing():
     prepared = prepare_record(record.with_channels(over))
     assert prepared.plan.judge[1] == half
     assert accounted(made.believed, prepared).faults == ()
+
+
+def test_a_rest_begins_where_friction_holds_the_mass_whatever_rounding_leaves_of_its_velocity():
+    """On one kind of processor 1e-34 m/s were left: of the sign before the rest, they hid where it begins."""
+    velocity = np.array([[0.5, 0.2, 1e-34, 1e-34, 1e-34, 0.1, 0.3]]).T
+    assert _turning(velocity).tolist() == [False, True, True, False, True, True, False]
+    assert _turning(-velocity).tolist() == _turning(velocity).tolist()
