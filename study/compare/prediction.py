@@ -66,11 +66,6 @@ class Prediction:
         return self.above(self.prepared.outputs.stacked(self.misfit))
 
     @cached_property
-    def relative_residual(self) -> Floats:
-        """The residuals over the sizes of their responses, those of one time side by side, shape (n s,)."""
-        return np.stack([view.residual / view.size for view in self.views], axis=1).ravel()
-
-    @cached_property
     def size(self) -> Floats:
         """Rms of each measured response about its mean, without what lies below ``low``, shape (s,)."""
         return np.array([view.size for view in self.views])

@@ -45,7 +45,8 @@ def test_each_sensor_is_judged_in_its_own_size() -> None:
     assert found.of(1).residual == pytest.approx(found.misfit[:, 1])
     weighed = found.prepared.outputs.stacked(found.misfit)
     assert found.residual == pytest.approx(weighed)
-    assert np.sqrt(np.mean(found.relative_residual**2)) == pytest.approx(found.error)
+    shares = np.stack([view.residual / view.size for view in found.views])
+    assert np.sqrt(np.mean(shares**2)) == pytest.approx(found.error)
 
 
 def test_what_stands_above_the_noise_of_one_sensor_is_seen() -> None:
