@@ -20,7 +20,8 @@ from study.records.record import Record
 from study.support.arrays import Floats
 
 CYCLES, SAMPLES = 4, 800  # of a harmonic motion, and samples a cycle
-TYPICAL = {"length": 0.4, "1/length": 1.0, "time": 0.15, "frequency": 0.5}  # for an amplitude of 1 m at 1 Hz
+# For an amplitude of 1 m at 1 Hz.
+TYPICAL = {"length": 0.4, "1/length": 1.0, "time": 0.15, "frequency": 0.5, "velocity": 1.0}
 OUTSIDE = ("CONTRIBUTING.md", "CITATION.cff", "README.md")  # of the folder of the site: their names alone are shown
 
 

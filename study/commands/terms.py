@@ -9,7 +9,6 @@ from study.commands.command import Command
 if TYPE_CHECKING:
     from study.equations.terms import Term
 
-PARAMETER_UNITS = {"length": "m", "time": "s", "frequency": "Hz", "1/length": "1/m"}
 WIDTH_WITHOUT_TERMINAL = 160
 NARROWEST = 24
 
@@ -48,8 +47,10 @@ def details(term: "Term") -> str:
     """One term: formula, physics, coefficients and shape parameters with their SI units, its line in a model."""
     from tabulate import tabulate
 
+    from study.figures.labels import SHAPE_UNITS
+
     rows = [["coefficient", s, term.unit(s, "N", "m"), _shape(term, s)] for s in term.symbols]
-    rows += [["shape parameter", p.name, PARAMETER_UNITS[p.quantity], p.meaning] for p in term.parameters]
+    rows += [["shape parameter", p.name, SHAPE_UNITS[p.quantity], p.meaning] for p in term.parameters]
     listing = tabulate(
         rows, ["", "symbol", "SI unit", "stands before, or is"], tablefmt="simple", disable_numparse=True
     )

@@ -66,6 +66,8 @@ def modal_entries(
     found: list[ModelTerm] = []
     for term in (t for t in effects if not external(t) and not _linear(t)):
         for place in between_sensors(model, prepared):
+            if term.angle and not prepared.record.rotations.issuperset(place.moving):
+                continue
             if (term.name, place.path) not in known:
                 found.append(free(term, place))
                 if one_sided(term):

@@ -21,7 +21,7 @@ class Component:
 
 Places = Literal[
     "quantiles of |u|", "quantiles of u", "times of the motion", "per amplitude", "shares of the one before",
-    "lines of the modulation", "lines of the residual",
+    "shares of the velocity", "lines of the modulation", "lines of the residual", "pitches of the residual",
 ]  # fmt: skip
 
 
@@ -30,8 +30,9 @@ class Search:
     """Where a shape parameter is looked for along the motion of a model that lacks the term.
 
     ``kind`` says what the places are: quantiles of a displacement; multiples of the time in which the motion turns by
-    one radian, of one over its rms displacement, or of the parameter before; or distances, in lines of the spectrum,
-    from where a stiffness that varies with time would explain most, or from the peaks of the residual.
+    one radian, of one over its rms displacement, of its rms velocity, or of the parameter before; or distances, in
+    lines of a spectrum, from where a stiffness that varies with time would explain most, or from the peaks of the
+    residual over time or over the displacement.
     """
 
     kind: Places
@@ -44,7 +45,7 @@ class ShapeParameter:
     """A shape parameter, given or estimated."""
 
     name: str  # in formulas
-    quantity: str  # its unit: ``length``, ``frequency``, ``time`` or ``1/length``
+    quantity: str  # its unit: ``length``, ``frequency``, ``time``, ``velocity`` or ``1/length``
     meaning: str  # to people
     search: Search  # where a fit looks for it
     # Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the parameter
@@ -96,6 +97,7 @@ class Term:
     reported: tuple[str, ...] = ()
     either_sign: bool = False  # as hardening and softening do: a trial then draws its sign
     placeless: bool = False  # whether it is the same wherever the system rests, but for another linear stiffness
+    angle: bool = False  # whether its displacement is an angle, in radians: it is no effect of a coordinate in metres
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -142,8 +144,8 @@ class Term:
 
     @property
     def tuned(self) -> bool:
-        """Whether a frequency of its own is picked from the lines of what is left, as many as the record shows."""
-        return any(p.search.kind.startswith("lines of") for p in self.parameters)
+        """Whether a frequency or pitch is picked from the peaks of what is left, as many as the record shows."""
+        return any(p.search.kind.startswith(("lines of", "pitches of")) for p in self.parameters)
 
     @property
     def steady(self) -> bool:
@@ -175,6 +177,7 @@ QUANTITIES = {
     "length": dimensions.VARIABLES["u"],
     "time": dimensions.VARIABLES["t"],
     "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
+    "velocity": dimensions.VARIABLES["v"],
     "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
 }
 STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements

@@ -25,13 +25,13 @@ def _single(
     name: str, symbol: str, shape: str, *,
     formula: str | None = None, order: int = 0, factor: float = 1.0, meaning: str, cause: str,
     parameters: tuple[ShapeParameter, ...] = (), state: str | None = None, conditions: tuple[PhysicalBound, ...] = (),
-    reported: tuple[str, ...] = (), either_sign: bool = False, placeless: bool = False,
+    reported: tuple[str, ...] = (), either_sign: bool = False, placeless: bool = False, angle: bool = False,
 ) -> Term:  # fmt: skip
     """An effect with one coefficient."""
     component = Component(symbol, shape, order, factor)
     return Term(
         name, (component,), formula or shape, meaning, cause, parameters, state, conditions, reported,
-        either_sign, placeless,
+        either_sign, placeless, angle,
     )  # fmt: skip
 
 
@@ -202,6 +202,56 @@ _TERMS = (
         ),
         placeless=True,
     ),
+    # Of measured rigs. Friction that differs by direction is Coulomb friction beside a constant force; what no other
+    # term has of two directions is damping.
+    _single(
+        "stribeck_friction", "fs", "sgn(v)*exp(-(v/v_s)**2)", formula="exp(-(v/v_s)^2) sgn v",
+        meaning="dry friction that falls as the velocity grows: its peak at rest over what stays, the Coulomb friction",
+        cause="lubricated guides and bearings, rack and pinion, seals",
+        parameters=(
+            ShapeParameter(
+                "v_s", "velocity", "Stribeck velocity, at which friction has nearly fallen",
+                Search("shares of the velocity", tuple(np.geomspace(0.03, 1.5, 7).tolist())), (0.15, 0.6),
+            ),
+        ),
+        conditions=_drains("fs", "friction that falls as the velocity grows"), placeless=True,
+    ),
+    _single(
+        "load_dependent_friction", "fu", "abs(u)*sgn(v)", formula="|u| sgn v",
+        meaning="dry friction that grows with the load of the spring beside it",
+        cause="leaf springs, wedges, structural damping at any frequency (Reid's model)",
+        conditions=_drains("fu", "friction"),
+    ),
+    _single(
+        "directional_damping", "cd", "abs(v)", formula="|v|",
+        meaning="damping that differs between the two directions: c + cd one way, c - cd the other",
+        cause="dampers of vehicles, check valves, lifting against gravity", either_sign=True, placeless=True,
+    ),
+    _single(
+        "directional_quadratic_damping", "cd2", "v**2", formula="v^2",
+        meaning="drag with the square of velocity that differs between the two directions",
+        cause="orifices and vanes of unlike edges, friction that differs by direction and grows with velocity",
+        either_sign=True, placeless=True,
+    ),
+    _single(
+        "pendulum_stiffness", "kp", "sin(u)", formula="sin u",
+        meaning="moment of a weight about a pivot, the displacement being an angle; negative where it stands above",
+        cause="pendulums, cranes, gravity on a disk or an arm out of balance", either_sign=True, angle=True,
+    ),
+    Term(
+        "cogging",
+        (Component("fp_cos", "cos(2*pi*u/pitch)"), Component("fp_sin", "sin(2*pi*u/pitch)")),
+        "cos(2 pi u/pitch + phase)",
+        "force that is periodic in position",
+        "magnets of a linear motor or a torque motor, teeth of a gear, balls of a screw",
+        (
+            ShapeParameter(
+                "pitch", "length", "distance after which the force repeats itself",
+                Search("pitches of the residual", AROUND), (0.3, 1.2),
+            ),
+        ),
+        placeless=True,
+    ),
 )  # fmt: skip
 
 LIBRARY: dict[str, Term] = {term.name: term for term in _TERMS}
@@ -211,7 +261,7 @@ def get(name: str) -> Term:
     """The library's term of this name."""
     if name not in LIBRARY:
         near = get_close_matches(name, LIBRARY, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(LIBRARY)}"
+        hint = f"; did you mean {near[0]!r}?" if near else "; `study terms` lists those that are known"
         raise StudyError(f"there is no term {name!r}{hint}")
     return LIBRARY[name]
 

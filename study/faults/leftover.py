@@ -328,7 +328,7 @@ def asks_for_more(left: FittedResidual) -> bool:
     One free run with the sensitivities of all effects without shape parameters; where that fails nothing is ruled out.
     """
     fit, model, keys = left.fit, left.fit.model, list[str]()
-    for entry in candidate_entries(model):
+    for entry in candidate_entries(model, turning=left.prepared.record.rotations):
         if not entry.parameters:
             model = model.with_term(replace(entry, coefficients=(0.0,) * len(entry.symbols)))
             keys += entry.symbols
@@ -356,7 +356,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     if fit.model.named and len(fit.model.coordinates) == 1:  # the search knows one coordinate without a name alone
         return None
     look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
-    entries = candidate_entries(fit.model)
+    entries = candidate_entries(fit.model, turning=prepared.record.rotations)
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
         base = shape_search.baseline(near, look)

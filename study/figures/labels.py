@@ -8,7 +8,7 @@ import pandas as pd
 from study.equations import dimensions, formulas, terms
 
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz"}
+SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz", "velocity": "m/s"}
 FREE_SHAPE = "miso_free_shape"  # the estimator that finds shape parameters too
 MOST_DIGITS = 6
 LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in brackets

@@ -47,7 +47,7 @@ def runge_kutta(run: FreeRun, values: dict[str, float], state: Floats) -> Floats
     return state
 
 
-@pytest.mark.parametrize("effect", [name for name in EFFECTS if name != "coulomb_friction"])
+@pytest.mark.parametrize("effect", [name for name in EFFECTS if "friction" not in name])
 def test_steps_are_those_of_the_instructions_one_by_one(make_model: Make, effect: str) -> None:
     model = with_effect(make_model, effect)
     rng = np.random.default_rng(1)

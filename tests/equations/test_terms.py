@@ -5,7 +5,7 @@ A new term needs one row in ``ROWS``; ``test_every_term_has_a_row`` says so when
 
 import ast
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +16,13 @@ from study.equations import formulas, kernels
 from study.equations.equations_of_motion import Equations
 from study.equations.graph import Graph
 from study.equations.model import Model, free
+from study.equations.possible_effects import candidate_entries
 from study.equations.simulate import Integrator, simulate
 from study.equations.term import Component, Term
 from study.equations.terms import LIBRARY, custom, get
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.excitation import Excitation, force
+from study.records.record import Record
 from study.support.errors import StudyError
 
 PERIOD = 10.24  # seconds; the frequencies below are whole multiples of 1/PERIOD, so that time-varying terms close too
@@ -78,6 +80,20 @@ ROWS: dict[str, Row] = {
     "harmonic_force": Row(
         {"fh_cos": 0.4, "fh_sin": 0.2, "harmonic_force.f": F_H},
         lambda s: 0.4 * np.cos(2 * np.pi * F_H * s.t) + 0.2 * np.sin(2 * np.pi * F_H * s.t),
+        ("N", "N"),
+    ),
+    "stribeck_friction": Row(
+        {"fs": 0.1, "stribeck_friction.v_s": 0.05},
+        lambda s: 0.1 * np.exp(-((s.v / 0.05) ** 2)) * np.sign(s.v),
+        ("N",), JUMP,
+    ),
+    "load_dependent_friction": Row({"fu": 40.0}, lambda s: 40.0 * np.abs(s.u) * np.sign(s.v), ("N/m",), JUMP),
+    "directional_damping": Row({"cd": 1.5}, lambda s: 1.5 * np.abs(s.v), ("N s/m",), KINK),
+    "directional_quadratic_damping": Row({"cd2": 30.0}, lambda s: 30.0 * s.v**2, ("N s^2/m^2",)),
+    "pendulum_stiffness": Row({"kp": 90.0}, lambda s: 90.0 * np.sin(s.u), ("N",)),
+    "cogging": Row(
+        {"fp_cos": 0.1, "fp_sin": -0.2, "cogging.pitch": 0.004},
+        lambda s: 0.1 * np.cos(2 * np.pi * s.u / 0.004) - 0.2 * np.sin(2 * np.pi * s.u / 0.004),
         ("N", "N"),
     ),
 }  # fmt: skip
@@ -204,7 +220,7 @@ def test_symbols_are_unique() -> None:
 def test_unknown_term_names_the_nearest() -> None:
     with pytest.raises(StudyError, match="did you mean 'cubic_stiffness'"):
         get("cubic_stifness")
-    with pytest.raises(StudyError, match="known are inertia"):
+    with pytest.raises(StudyError, match="`study terms` lists those that are known"):
         get("qqqq")
 
 
@@ -245,6 +261,13 @@ UNPHYSICAL: tuple[tuple[str, dict[str, float], str], ...] = (
         "beta is 1 and gamma is -1.5; a Bouc-Wen element is passive for |gamma| <= beta",
     ),
     ("harmonic_force", {"harmonic_force.f": 0.0}, "f is 0; the frequency of the force is above zero"),
+    (
+        "stribeck_friction",
+        {"fs": -0.1, "stribeck_friction.v_s": 1.0},
+        "fs is -0.1; friction that falls as the velocity grows takes energy out, so it is zero or more",
+    ),
+    ("load_dependent_friction", {"fu": -2.0}, "fu is -2; friction takes energy out, so it is zero or more"),
+    ("cogging", {"cogging.pitch": 0.0}, "pitch is 0; the distance after which the force repeats itself is above zero"),
 )
 
 
@@ -265,6 +288,9 @@ def test_what_is_not_physical_is_said_in_a_sentence(name: str, values: dict[str,
         ("one_sided_contact", {"kc": 1.0, "one_sided_contact.gap": -0.1}),
         ("hysteresis", {"kz": 1.0, "hysteresis.beta": 1.0, "hysteresis.gamma": -1.0}),
         ("constant_force", {"f0": -1.0}),
+        ("directional_damping", {"cd": -1.0}),
+        ("directional_quadratic_damping", {"cd2": -1.0}),
+        ("pendulum_stiffness", {"kp": -1.0}),
     ],
 )
 def test_softening_self_excitation_and_a_preload_are_physical(name: str, values: dict[str, float]) -> None:
@@ -272,9 +298,20 @@ def test_softening_self_excitation_and_a_preload_are_physical(name: str, values:
 
 
 def test_a_fit_keeps_the_mass_and_what_has_no_sign_above_zero() -> None:
-    kept = tuple(key for term in LIBRARY.values() for key in term.positive)
-    assert kept == ("m", "dead_band.u_g", "periodic_stiffness.f_m", "relaxation.tau", "harmonic_force.f")
+    kept = [key for term in LIBRARY.values() for key in term.positive]
+    shapes = "dead_band.u_g periodic_stiffness.f_m relaxation.tau harmonic_force.f stribeck_friction.v_s cogging.pitch"
+    assert kept == ["m", *shapes.split()]
     assert custom("own", "u**2").positive == ()
+
+
+def test_what_acts_on_an_angle_is_asked_for_where_one_was_measured() -> None:
+    model = model_with("linear_stiffness")
+    asked = {turning: [e.term.name for e in candidate_entries(model, turning=turning)] for turning in ((), ("",))}
+    assert "pendulum_stiffness" not in asked[()]
+    assert set(asked[("",)]) == {*asked[()], "pendulum_stiffness"} == set(LIBRARY) - set(LINEAR)
+    record = Record(0.1, {"force": np.zeros(4), "displacement": np.zeros(4)}, {"force": "N m", "displacement": "rad"})
+    assert record.rotations == {""}
+    assert not replace(record, units={**record.units, "displacement": "mm"}).rotations
 
 
 def test_only_a_steady_force_moves_the_place_of_rest() -> None:

@@ -31,6 +31,7 @@ POINTS = {
     "one_sided_contact": np.quantile(U, np.linspace(0.1, 0.985, 16))[:, None],
     "relaxation": np.geomspace(0.05, 20.0, 12)[:, None] / RATE,
     "hysteresis": np.array([(b, b * g) for b in (0.15, 0.4, 1.0, 2.5, 6.0) for g in (-0.9, -0.3, 0.3, 0.9)]) / SIZE,
+    "stribeck_friction": np.geomspace(0.03, 1.5, 7)[:, None] * SIZE * RATE,
 }
 
 
@@ -48,6 +49,24 @@ def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) 
         for shift in (-0.35, 0.0, 0.35):
             assert np.min(np.abs(found - line - shift)) < 0.05
     assert len(found) % 3 == 0
+
+
+@pytest.mark.parametrize("pitch", [0.013, 0.03])
+def test_the_pitch_of_a_force_is_that_of_the_residual_over_the_displacement(pitch: float) -> None:
+    """... beside noise of its own size."""
+    rng = np.random.default_rng(5)
+    residual = np.cos(2 * np.pi * U / pitch + 0.7) + rng.standard_normal(N)
+    basis = np.linalg.qr(np.stack([U, np.gradient(U, DT)], axis=1))[0]  # a coefficient of the model takes a part
+    fit = SimpleNamespace(
+        residual=residual - basis @ (basis.T @ residual), model=SimpleNamespace(coordinates=("",)),
+        outputs=SimpleNamespace(weights=(1.0,)), samples=N,
+    )  # fmt: skip
+    base = SimpleNamespace(
+        several=True, fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"),
+        paths=lambda size: np.ones((size // 2 + 1, 1, 1)),
+    )  # fmt: skip
+    found = np.array(shape_search.points_to_try(free(get("cogging")), U, base))[:3, 0]  # to either side of the highest
+    assert abs(np.ptp(U) / found[1] - np.ptp(U) / pitch) < 0.2  # of a pitch more or less along the whole motion
 
 
 @pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])

@@ -18,6 +18,7 @@ from study.records.readers import read_record
 from study.support.errors import StudyError
 from study.trials import DRIVEN_MASS, HIDDEN, SHARE, make_trial, sealed, share_of
 from study.trials.driven import EXCITATIONS, LABORATORIES, PLAIN_RATE, wide
+from study.trials.effects import LATER
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -50,7 +51,7 @@ def test_share_is_what_no_linear_model_can_take_over() -> None:
 
 
 def test_library_beside_the_linear_terms_is_covered() -> None:
-    assert set(HIDDEN) == set(LIBRARY) - {"inertia", "linear_damping", "linear_stiffness"}
+    assert {*HIDDEN, *LATER} == set(LIBRARY) - {"inertia", "linear_damping", "linear_stiffness"}
 
 
 def test_same_seed_same_bytes_and_other_seed_other_record() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.modal_lines import line_fits
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.shape_search import Screened, Start, highest_lines, values_to_try, windowed
+from study.identify.time_domain.shape_search import PITCHES, Screened, Start, highest_lines, values_to_try, windowed
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -65,7 +65,9 @@ def _points(
     u = np.sum([w * prepared.record.motion(c)[0] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
     u = u[slice(*prepared.plan.fit)]
 
-    def near(_: str, shifts: Floats) -> Floats:
+    def near(kind: str, shifts: Floats) -> Floats:
+        if kind == PITCHES:  # what is left beside modes is not looked at along a displacement
+            return np.zeros(0)
         return np.add.outer(lines, shifts / (len(u) * prepared.dt)).ravel()
 
     points: list[tuple[float, ...]] = [()]

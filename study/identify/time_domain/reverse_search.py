@@ -154,7 +154,7 @@ def corrected_motion(
     """
     runs = [slice(begin - span[0], end - span[0]) for begin, end in prepared.record.runs(span)]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
-    for sensor, values in zip(prepared.sensors, difference.T, strict=True):
+    for sensor, values in zip(prepared.outputs.sensors, difference.T, strict=True):
         band, level = band_above_noise(values, prepared.dt, prepared.band[0]), MOTIONS.index(sensor.motion)
         if band is None:
             continue

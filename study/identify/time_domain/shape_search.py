@@ -22,6 +22,7 @@ from study.identify.frequency_domain.starting_values import linear_start, oscill
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
 from study.identify.time_domain.reverse_search import EquationsAlongMotion, equations_along_motion
+from study.records.interpolation import between_samples
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
@@ -33,7 +34,7 @@ PERIODS = 100.0  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
-MODULATION = "lines of the modulation"  # of the two kinds of spectra whose lines are tried
+MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
 STARTS = 4  # points of the search that start a fit
 CUTOFF = 1e-8  # of the largest singular value
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
@@ -197,6 +198,8 @@ def points_to_try(entry: ModelTerm, u: Floats, base: Baseline) -> list[tuple[flo
     """Points to try beside what is given: amplitudes from a motion u, times from the resonance, lines of spectra."""
 
     def lines(kind: str, shifts: Floats) -> Floats:
+        if kind == PITCHES:
+            return pitches(u, entry.place, base, shifts)
         found = modulation_lines(u, entry.place, base) if kind == MODULATION else residual_lines(base)
         return np.add.outer(np.array(found), shifts).ravel() / (len(u) * base.prepared.dt)
 
@@ -221,8 +224,8 @@ def values_to_try(
 ) -> list[float]:  # fmt: skip
     """Values of one shape parameter for a motion u beside those of the parameters before it, ``point``.
 
-    ``lines`` gives, for a kind of spectrum, frequencies in hertz so many lines to either side of those that stand out;
-    ``sharp`` are further places of what goes with the amplitude.
+    ``lines`` gives, for a kind of spectrum, frequencies in hertz so many lines to either side of those that stand out,
+    or pitches; ``sharp`` are further places of what goes with the amplitude.
     """
     places = np.array(parameter.search.places)
     match parameter.search.kind:
@@ -232,6 +235,8 @@ def values_to_try(
             tried = np.quantile(u, places)
         case "times of the motion":
             tried = places / float(np.std(np.gradient(u, dt)) / np.std(u))
+        case "shares of the velocity":
+            tried = places * float(np.std(np.gradient(u, dt)))
         case "per amplitude":
             tried = np.concatenate([places, sharp]) * (1.0 / float(np.std(u)))
         case "shares of the one before":
@@ -252,16 +257,46 @@ def modulation_lines(u: Floats, place: Place, base: Baseline) -> list[float]:
     The response added by ``u cos(2 pi f t)`` is ``H * (u cos)``; its product with the residual, summed, is one line of
     the spectrum of ``u``, shape (n,), times the residuals filtered by H backwards in time.
     """
-    n, weights = len(u), np.array(base.fit.outputs.weights)
-    path = base.paths(n) @ np.array(place.direction(base.fit.model.coordinates)) * weights
-    residual = base.fit.residual.reshape(n, -1)
-    spectra = np.asarray(rfft(residual, axis=0), dtype=np.complex128)
-    matched = np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), n), dtype=np.float64)
-    numerator = np.abs(windowed(matched * u)) ** 2
-    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
+    n, numerator = len(u), np.abs(windowed(matched(place, base) * u)) ** 2
+    passband = np.asarray(irfft(np.sum(np.abs(_path(place, base)) ** 2, axis=1), n), dtype=np.float64)
     spread = np.asarray(irfft(np.abs(np.asarray(rfft(u))) ** 2, n), dtype=np.float64)
     denominator = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
     return highest_lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
+
+
+def pitches(u: Floats, place: Place, base: Baseline, shifts: Floats) -> Floats:
+    """Pitches at which a force of a place that is periodic in its displacement u, shape (n,), would explain most.
+
+    By a matched filter as of a modulation, but over the displacement: what the residual tells of the force at each
+    sample, gathered in bins of where that was, has lines at one over the pitches. That is along the measured motion: a
+    model that lacks the force is soon pitches away. At its rms velocity the motion takes one sample for a pitch at
+    least.
+    """
+    if not base.several and base.prepared.response != FORCE:
+        u = base.reverse.record(place)["displacement"]
+    span, step = float(np.ptp(u)), float(np.sqrt(np.mean(np.diff(u) ** 2)))
+    if not (np.isfinite(span) and 0.0 < step < span):
+        return np.zeros(0)
+    finer = 4  # points for a sample, and bins for the shortest pitch
+    where, told = (between_samples(values, finer) for values in (u, matched(place, base)))
+    bins = int(finer * span / step)
+    along = np.histogram(where, bins, (float(np.min(u)), float(np.max(u))), weights=told)[0]
+    spectrum = np.abs(np.asarray(rfft(along, 2 * bins)))[: 2 * bins // finer] ** 2  # half a line apart
+    rounds = np.add.outer(0.5 * np.array(highest_lines(spectrum)), shifts).ravel()
+    return span / rounds[rounds > 0.5]
+
+
+def matched(place: Place, base: Baseline) -> Floats:
+    """What the residual tells of a force at a place, shape (n,): filtered by the path to the sensors, backwards."""
+    path = _path(place, base)
+    spectra = np.asarray(rfft(base.fit.residual.reshape(base.fit.samples, -1), axis=0), dtype=np.complex128)
+    return np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), base.fit.samples), dtype=np.float64)
+
+
+def _path(place: Place, base: Baseline) -> Complexes:
+    """From a force at a place to each weighted sensor, shape (lines, s)."""
+    e, weights = place.direction(base.fit.model.coordinates), base.fit.outputs.weights
+    return np.asarray(base.paths(base.fit.samples) @ np.array(e) * np.array(weights), dtype=np.complex128)
 
 
 def residual_lines(base: Baseline) -> list[float]:
