@@ -11,7 +11,7 @@ from study.compare.history_picture import history_files as history_pictures
 from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, Diagnosis
+from study.diagnose.verdict import Diagnosis
 from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files
@@ -43,9 +43,9 @@ def climb(
     session = sessions.begin_with(together.comparison)
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")
-        if diagnosis.verdict != MISSING or number == steps or _in_a_circle(session, diagnosis.candidates[0]):
+        if diagnosis.answer is None or number == steps or _in_a_circle(session, diagnosis.answer):
             break
-        session = _stepped_back(sessions.with_added(session, diagnosis.candidates[0].name))
+        session = _stepped_back(sessions.with_added(session, diagnosis.answer.name))
     saved = files(session, model.name, text)
     write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
     write_files(folder, history_pictures(session.steps, model.stem))
@@ -57,7 +57,7 @@ def climb(
 def _in_a_circle(session: Session, first: Ranked) -> bool:
     """Whether a candidate was taken out before and would bring no model that is better than all so far."""
     least = min(stage.comparison.prediction.error for stage in session.stages)
-    again = first.name in {stage.dropped for stage in session.stages} and first.response_error >= least
+    again = bool({stage.dropped for stage in session.stages} & set(first.names)) and first.response_error >= least
     if again:
         print(f"{first.name} was taken out before and brings nothing that was not reached: the climb ends\n")
     return again
@@ -65,10 +65,10 @@ def _in_a_circle(session: Session, first: Ranked) -> bool:
 
 def _stepped_back(session: Session) -> Session:
     """The session without what its model does not need any more after an addition."""
-    added = session.now.added
+    added = (session.now.added or "").split(" + ")
     while True:
         session = sessions.weighed(session)
-        found = [n for n in session.now.unneeded or () if n.name != added]
+        found = [n for n in session.now.unneeded or () if n.name not in added]
         if not found:
             return session
         print(found[0].sentence(any_more=True) + "\n")

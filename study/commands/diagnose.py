@@ -81,14 +81,13 @@ def _diagnosed(
     from study.compare import each_record
     from study.compare.each_record import levels_by_record
     from study.diagnose import diagnosis_report
-    from study.diagnose.confirmed_faults import confirmed
+    from study.diagnose.confirmed_faults import diagnosed
     from study.diagnose.diagnosis_files import (
         diagnosis_files,
         diagnosis_in_words,
         modes_before_and_after,
         unneeded_in_words,
     )
-    from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
 
@@ -98,14 +97,15 @@ def _diagnosed(
         accounted = accounted_together(arguments, model, marked, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        diagnosis = diagnose_as_read(
-            accounted.comparison, extra=own, without=without, progress=lambda _, total: step("", total)
-        )
+        found = diagnosed(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
+        diagnosis, accounted = found.diagnosis, found.accounted
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)
-        words, faults = diagnosis_in_words(diagnosis), confirmed(accounted.faults, diagnosis)
+        words, faults = diagnosis_in_words(diagnosis), found.faults
     print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.candidate_table(diagnosis))
+    if table := diagnosis_report.set_table(diagnosis):
+        print(f"\n{table}")
     for effect, why in untried.items():
         print(f"{effect} could not be fitted: {why}")
     levels = levels_by_record(accounted.comparison, separate, records)

@@ -28,7 +28,8 @@ def added(comparison: Comparison, term: Term | ModelTerm) -> Comparison:
 
 
 def added_candidate(comparison: Comparison, candidate: Ranked) -> Comparison:
-    """The comparison of the model with a candidate of its diagnosis, begun where the candidate's fit ended."""
-    prepared = comparison.prepared
-    fit = finished(candidate.fit, prepared)
-    return running_on(compare(comparison.model.with_term(candidate.entry), prepared, fit=fit))
+    """The comparison of the model with an effect or a set of its diagnosis, begun where the fit of that ended."""
+    prepared, model = comparison.prepared, comparison.model
+    for entry in candidate.entries:
+        model = model.with_term(entry)
+    return running_on(compare(model, prepared, fit=finished(candidate.fit, prepared)))

@@ -4,8 +4,10 @@ Where few are asked for, as of a single mass, all are fitted. A structure has ma
 at which of them which effects are worth a fit (``shape_search``).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from study.compare.prediction import Prediction, predict
 from study.equations.model import ModelTerm
@@ -28,27 +30,56 @@ SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and
 
 @dataclass(frozen=True, eq=False)
 class FittedCandidate:
-    """A candidate as fitted."""
+    """An effect that a model may lack, or a set of effects, as fitted beside it."""
 
-    entry: ModelTerm  # the effect and its place
-    fit: FreeRunFit  # the model with it, fitted on the fitting part
+    entries: tuple[ModelTerm, ...]  # the effects and their places
+    fit: FreeRunFit  # the model with them, fitted on the fitting part
     prediction: Prediction  # its free run along the judging part
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Of each effect, with its place where that has a name."""
+        return tuple(entry.name for entry in self.entries)
+
+    @property
     def name(self) -> str:
-        """Effect, and place where that has a name."""
-        return self.entry.name
+        """The same in one piece."""
+        return " + ".join(self.names)
+
+    @property
+    def entry(self) -> ModelTerm:
+        """The effect, or the first of a set, and its place."""
+        return self.entries[0]
 
     @property
     def term(self) -> Term:
-        """The effect."""
+        """The effect, or the first of a set."""
         return self.entry.term
+
+    @property
+    def unknowns(self) -> int:
+        """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is."""
+        return sum(len(e.term.components) + len(e.term.parameters) for e in self.entries)
+
+    @property
+    def flexible(self) -> bool:
+        """Whether an effect has a clock, a memory or a shape of its own."""
+        return self.unknowns > len(self.entries)
+
+    @property
+    def power(self) -> float:
+        """Mean square of what it leaves on both parts."""
+        return float(np.mean(np.concatenate([self.fit.residual, self.prediction.residual]) ** 2))
 
     @property
     def unphysical(self) -> str:
         """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
         values = self.fit.model.values
-        return self.term.physical({own: values.get(k) for own, k in zip(self.term.keys, self.entry.keys, strict=True)})
+        return next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
+
+
+def _own(entry: ModelTerm, values: Mapping[str, float | None]) -> dict[str, float | None]:
+    return {own: values.get(key) for own, key in zip(entry.term.keys, entry.keys, strict=True)}
 
 
 def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None) -> list[FittedCandidate]:
@@ -144,7 +175,7 @@ def attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> F
 
 def _attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> FittedCandidate | None:
     try:
-        return judged_candidate(entry, with_term(base, entry, points), base.prepared)
+        return judged_candidate((entry,), with_term(base, entry, points), base.prepared)
     except StudyError:
         return None
 
@@ -158,10 +189,12 @@ def _plainer(entry: ModelTerm) -> ModelTerm | None:
     return replace(entry, parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
-def judged_candidate(entry: ModelTerm, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
+def judged_candidate(
+    entries: tuple[ModelTerm, ...], fit: FreeRunFit, prepared: Prepared
+) -> FittedCandidate | None:  # fmt: skip
     """A fitted candidate with its prediction; None where its free run does not stay finite."""
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else FittedCandidate(entry, fit, prediction)
+    return None if prediction.diverged else FittedCandidate(entries, fit, prediction)
 
 
 def with_best_settled(tried: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
@@ -176,7 +209,7 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
     def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
             fit = finished(candidate.fit, prepared)
-            return judged_candidate(candidate.entry, fit, prepared) or candidate
+            return judged_candidate(candidate.entries, fit, prepared) or candidate
         except StudyError:
             return candidate
 

@@ -1,21 +1,76 @@
 """Faults of the measurement in the light of a diagnosis."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+from study.diagnose.candidates import Progress
+from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
-from study.diagnose.verdict import MISSING, Diagnosis
-from study.faults.accounting import still_seen
+from study.diagnose.verdict import Diagnosis
+from study.equations.terms import Term
+from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import Fault
+from study.support.errors import StudyError
+from study.support.thresholds import TOLERANCE, K
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A diagnosis of a record as it is corrected in the light of what is missing."""
+
+    diagnosis: Diagnosis
+    accounted: Accounted  # the comparison that it is of, and what the record is corrected for
+    faults: tuple[Fault, ...]  # those that the record shows beside what is missing as well
+
+
+def diagnosed(
+    accounted: Accounted, *, extra: Sequence[Term] = (), without: Sequence[str] = (), progress: Progress | None = None
+) -> Diagnosed:
+    """The diagnosis of a comparison, faults and effects asked for in the light of each other.
+
+    What a model lacks hides faults and imitates others. So where a set of effects is found, or something is left beside
+    what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
+    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Arguments as for
+    :func:`study.diagnose.verdict.diagnose`.
+    """
+    def found(one: Accounted) -> Diagnosed:
+        diagnosis = diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
+        return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
+
+    first = found(accounted)
+    answer = first.diagnosis.answer
+    if answer is None or (first.diagnosis.left <= TOLERANCE and not (accounted.faults and len(answer.entries) > 1)):
+        return first
+    model = accounted.comparison.model
+    for entry in answer.entries:
+        model = model.with_term(entry)
+    try:
+        faults = accounted.beside(answer.fit, model)
+        if same(faults, accounted.faults):
+            return first
+        again = found(accounted.corrected_for(faults))
+    except StudyError:
+        return first
+    better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
+    return again if better else first
+
+
+def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:
+    """Whether two searches found the same faults to correct, with values that their errors cannot tell apart."""
+    mine, theirs = ({(f.fault, f.channel): f for f in faults if f.corrected} for faults in (one, other))
+    return set(mine) == set(theirs) and all(
+        abs(f.value - theirs[key].value) <= K * (f.error**2 + theirs[key].error ** 2) ** 0.5 for key, f in mine.items()
+    )
 
 
 def confirmed(faults: Sequence[Fault], diagnosis: Diagnosis) -> tuple[Fault, ...]:
-    """The faults that the record shows beside the effect that is missing as well, if one is.
+    """The faults that the record shows beside the effects that are missing as well, if any are.
 
     With a delay of a component's force, where that does what the first candidate does.
     """
     late = late_force(diagnosis)
     if late is not None:
         return (*faults, late)
-    if diagnosis.verdict != MISSING:
+    if diagnosis.answer is None:
         return tuple(faults)
-    return still_seen(faults, diagnosis.candidates[0].fit, diagnosis.comparison.prepared)
+    return still_seen(faults, diagnosis.answer.fit, diagnosis.comparison.prepared)

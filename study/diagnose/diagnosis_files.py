@@ -10,7 +10,7 @@ from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
 from study.diagnose.separating_test import advice
-from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.diagnose.verdict import NOTHING, Diagnosis
 from study.equations.linear_part import modes_table
 from study.faults import fault
 from study.faults.fault import Fault
@@ -19,8 +19,8 @@ from study.faults.fault import Fault
 def diagnosis_in_words(diagnosis: Diagnosis) -> str:
     """A diagnosis in sentences, with the test that would tell tied candidates apart."""
     said = diagnosis_sentences(diagnosis)
-    if diagnosis.verdict == MISSING:
-        said.append(advice(diagnosis.candidates, diagnosis.comparison.prepared))
+    if diagnosis.answer is not None:
+        said.append(advice(diagnosis.sets, diagnosis.comparison.prepared))
     said += [f"{note[0].upper()}{note[1:]}." for note in choices_in_words(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
@@ -67,7 +67,7 @@ def diagnosis_files(
 
 
 def modes_before_and_after(diagnosis: Diagnosis) -> str:
-    """The modes of a structure as given, and with the first candidate."""
+    """The modes of a structure as given, and with what is missing."""
     comparison, after = diagnosis.comparison, diagnosis.modes_after
     before = modes_table(comparison.modes, comparison.model.coordinates)
     if after is None:

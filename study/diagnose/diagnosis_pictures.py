@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from study.compare.place_pictures import modes, sketch_of, structure_figure
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, Diagnosis
+from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.labels import term_names
 from study.figures.sketch import Sketch, sketch
@@ -31,7 +31,7 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
         drawn = diagnosis_figures(diagnosis, record) if diagnosis.candidates or not comparison.model.named else {}
         if comparison.model.named:
             sets = [("as given", comparison.modes)]
-            sets += [("with the first candidate", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
+            sets += [("with what is missing", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
             drawn["structure"] = structure_figure(comparison, sketch_of_diagnosis(diagnosis))
             drawn["modes"] = modes(comparison, sets)
         return page.image_files(drawn)
@@ -40,13 +40,12 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
 def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
     """The sketch of a structure, glowing where an effect that is found, or tied with it, explains what is left."""
     comparison = diagnosis.comparison
-    if diagnosis.verdict != MISSING:
+    if diagnosis.answer is None:
         return sketch_of(comparison)
-    first = diagnosis.candidates[0]
     shares: dict[frozenset[str], float] = {}
-    for row in diagnosis.candidates:
-        if row.name in (first.name, *first.tied_with):
-            shares.setdefault(row.entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
+    for row in diagnosis.sets:
+        for entry in row.entries:
+            shares.setdefault(entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
     return sketch(comparison.model, comparison.missing.coordinates, shares)
 
 

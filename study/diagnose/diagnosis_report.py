@@ -47,11 +47,44 @@ def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "candidates": [_candidate(row, rows, named) for row in diagnosis.candidates],
         "asked": diagnosis.asked,
-        "pair": list(diagnosis.pair),
+        "sets": [_set(row, named) for row in diagnosis.sets],
+        "in_sets": diagnosis.included,
         "left": diagnosis.left,
         "depends_on": on if named else {f.family: f.gain.explained for f in families},
         "converged": diagnosis.comparison.fit.converged,
     }
+
+
+def set_table(diagnosis: Diagnosis) -> str:
+    """The sets of effects that the record cannot tell from the best, the answer first; empty for a single effect."""
+    if all(len(row.entries) == 1 for row in diagnosis.sets):
+        return ""
+    head = ["", "effects together", "explain", "error with them", "unknowns", "behind the first by"]
+    rows = [
+        [
+            str(i), ", ".join(row.names), percent(row.gain.explained, "z.1f"), percent(row.response_error),
+            str(row.unknowns), "-" if i == 1 else f"{row.distance:.1f} standard errors",
+        ]
+        for i, row in enumerate(diagnosis.sets[:SHOWN], start=1)
+    ]  # fmt: skip
+    more = len(diagnosis.sets) - SHOWN
+    shown = tabulate(rows, head, tablefmt="simple", disable_numparse=True)
+    return shown + (f"\n... and {more} more, in diagnosis.json" if more > 0 else "")
+
+
+def _set(row: Ranked, named: bool) -> dict[str, Any]:
+    return {
+        "effects": [
+            {
+                "term": e.entry.term.name, **(e.entry.place.plain() if named else {}), "coefficient": e.coefficient,
+                "interval": list(e.interval), "parameters": e.parameters, "parameter_errors": e.parameter_errors,
+            }
+            for e in row.effects
+        ],
+        "response_error": row.response_error, "explained": row.gain.explained, "p_value": row.p_value,
+        "unknowns": row.unknowns, "distance": row.distance if math.isfinite(row.distance) else None,
+        "unphysical": row.unphysical, "converged": row.fit.converged,
+    }  # fmt: skip
 
 
 def _candidate(row: Ranked, rows: dict[str, Ranked], named: bool) -> dict[str, Any]:

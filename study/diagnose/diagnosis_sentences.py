@@ -5,12 +5,14 @@ from collections.abc import Sequence
 
 from study.diagnose.constancy import wavers
 from study.diagnose.held_out import evidence, held_out_of
-from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.diagnose.ranked import FittedEffect, Ranked
+from study.diagnose import verdict
+from study.diagnose.verdict import NOTHING, PARTLY, Diagnosis
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
+from study.equations.coefficient_units import coefficient_unit
 from study.figures.labels import term_names
-from study.support.numbers import by_chance, percent
+from study.support.numbers import by_chance, enumerated, percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -22,7 +24,13 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     """What to tell the engineer."""
     if diagnosis.verdict == NOTHING:
         return [_nothing(diagnosis)]
-    said = _missing(diagnosis) if diagnosis.verdict == MISSING else _unknown(diagnosis)
+    match diagnosis.verdict:
+        case verdict.MISSING:
+            said = _missing(diagnosis)
+        case verdict.SEVERAL | verdict.PARTLY:
+            said = _several(diagnosis, diagnosis.sets[0])
+        case _:
+            said = _unknown(diagnosis)
     if diagnosis.comparison.prediction.diverged:
         said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
     return said
@@ -71,17 +79,40 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
         f"Its coefficient is {_amount(first)}{_shape(first)}.",
     ]
     rows = {row.name: row for row in diagnosis.candidates}
-    if diagnosis.pair:
-        second = next(name for name in diagnosis.pair if name != first.name)
-        words = effect_in_words(rows[second].entry)
-        said.append(f"It does not explain all: of all candidates, {words} beside it explains most.")
-    elif diagnosis.left > 0.0:
+    if diagnosis.left > 0.0:
         said.append(f"Structure of {percent(diagnosis.left)} of the response is left beside it.")
     if first.unphysical:
         said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
+
+
+def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
+    effects = enumerated([effect_in_words(e.entry) for e in answer.effects])
+    known = "are missing" if diagnosis.verdict != PARTLY else "are missing, and something beside them that has no name"
+    said = [
+        f"{effects[0].upper()}{effects[1:]} {known}.",
+        f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; the "
+        f"noise floor is {percent(answer.prediction.floor)}.",
+        f"Their coefficients are {enumerated([_amount_of(e, answer) for e in answer.effects])}.",
+    ]
+    if diagnosis.left > 0.0:
+        said.append(f"{percent(diagnosis.left)} of the response is left beside them that still depends on the motion.")
+    if answer.unphysical:
+        said.append(f"As fitted one of them is no physical effect: {answer.unphysical}.")
+    if len(diagnosis.sets) > 1:
+        count = len(diagnosis.sets)
+        often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]
+        said.append(f"The record cannot tell {count} such sets apart; of these {count}, {enumerated(often)}.")
+    return said
+
+
+def _amount_of(effect: FittedEffect, row: Ranked) -> str:
+    low, high = effect.interval
+    digits = _digits(effect.coefficient, high - low)
+    unit = coefficient_unit(effect.entry, effect.entry.term.symbols[0], row.prediction.prepared.record)
+    return f"{effect.coefficient:.{digits}g} {unit} ({low:.{digits}g} to {high:.{digits}g})"
 
 
 def _unknown(diagnosis: Diagnosis) -> list[str]:

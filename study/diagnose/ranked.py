@@ -22,30 +22,94 @@ ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding lea
 
 
 @dataclass(frozen=True, eq=False)
-class Ranked(FittedCandidate):
-    """One candidate."""
+class FittedEffect:
+    """One effect of a candidate with what was found of it."""
 
-    gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
-    p_value: float  # that of both parts of the record, with the number of candidates accounted for (Bonferroni)
+    entry: ModelTerm
     coefficient: float  # its size: the amplitude, for an effect of any phase
     error: float  # standard error of that
     parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
     parameter_errors: dict[str, float]  # their standard errors
     flatness: CoefficientCurve | None  # the coefficient along frequency
     steadiness: CoefficientCurve | None  # the coefficient along amplitude
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+
+    @property
+    def unsteadiness(self) -> float:
+        """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
+        return changes(self.flatness, self.steadiness)
+
+    @property
+    def clear(self) -> float:
+        """The coefficient in its standard errors."""
+        return abs(self.coefficient) / self.error if self.error > 0.0 else math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked(FittedCandidate):
+    """One candidate."""
+
+    effects: tuple[FittedEffect, ...]  # each of its effects
+    gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
+    p_value: float  # that of both parts of the record, with the number of candidates accounted for (Bonferroni)
     held_out: HeldOut  # its residuals on both parts of the record
     tied_with: tuple[str, ...] = ()  # candidates that this record cannot tell from it
     distance: float = math.inf  # standard errors by which it leaves more than the first; 0 for the first
 
     @property
+    def effect(self) -> FittedEffect:
+        """The effect; of a set, the one that is known least."""
+        return min(self.effects, key=lambda effect: effect.clear)
+
+    @property
+    def coefficient(self) -> float:
+        """Coefficient of the effect."""
+        return self.effect.coefficient
+
+    @property
+    def error(self) -> float:
+        """Its standard error."""
+        return self.effect.error
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its 95 % confidence interval."""
+        return self.effect.interval
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Shape parameters of the effect, and its phase if it has any."""
+        return self.effect.parameters
+
+    @property
+    def parameter_errors(self) -> dict[str, float]:
+        """Their standard errors."""
+        return self.effect.parameter_errors
+
+    @property
+    def flatness(self) -> CoefficientCurve | None:
+        """The effect's coefficient along frequency."""
+        return self.effect.flatness
+
+    @property
+    def steadiness(self) -> CoefficientCurve | None:
+        """The effect's coefficient along amplitude."""
+        return self.effect.steadiness
+
+    @property
     def unit(self) -> str:
         """Unit of the coefficient."""
-        return coefficient_unit(self.entry, self.term.symbols[0], self.prediction.prepared.record)
+        entry = self.effect.entry
+        return coefficient_unit(entry, entry.term.symbols[0], self.prediction.prepared.record)
 
     @property
     def parameter_units(self) -> dict[str, str]:
         """Units of the parameters, by their names."""
-        return parameter_units(self.entry, self.prediction.prepared.record) | {"phase": "rad"}
+        return parameter_units(self.effect.entry, self.prediction.prepared.record) | {"phase": "rad"}
 
     @property
     def residual(self) -> Floats:
@@ -66,7 +130,7 @@ class Ranked(FittedCandidate):
         return self.prediction.error
 
     def wanders(self, asked: int) -> bool:
-        """Whether its coefficient, of so many that are asked for, moves as that of a true term would not.
+        """Whether a coefficient, of so many that are asked for, moves as that of a true term would not.
 
         Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may
         change by a share of itself then; by no more than itself, where it takes a tenth of what a good model leaves.
@@ -76,31 +140,30 @@ class Ranked(FittedCandidate):
             return self.unsteadiness > 1.0
         if good or self.gain.explained >= ENOUGH:
             return self.unsteadiness > UNSTEADY
-        return wavers(self.steadiness, asked)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the coefficient."""
-        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+        return any(wavers(effect.steadiness, asked) for effect in self.effects)
 
     @property
     def unsteadiness(self) -> float:
-        """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
-        return changes(self.flatness, self.steadiness)
+        """By how much, relative to itself, a coefficient changes with frequency or amplitude, at most."""
+        found = [effect.unsteadiness for effect in self.effects]
+        return max((x for x in found if not math.isnan(x)), default=math.nan)
 
 
 def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
-    """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
+    """A candidate with its coefficients' errors and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)
     covariance = uncertainty(fit, prepared, jacobian)
-    coefficient, error, parameters, errors = amount(candidate.entry, fit.keys, fit.values, covariance)
-    flatness, steadiness = curves(fit, candidate.entry, prepared.dt, jacobian)
+    effects = tuple(
+        FittedEffect(
+            entry, *amount(entry, fit.keys, fit.values, covariance), *curves(fit, entry, prepared.dt, jacobian)
+        )
+        for entry in candidate.entries
+    )
     return Ranked(
-        entry=candidate.entry, fit=fit, prediction=candidate.prediction,
+        candidate.entries, fit, candidate.prediction, effects,
         gain=statistics.gain(before.residual, candidate.prediction.residual), p_value=1.0,
-        coefficient=coefficient, error=error, parameters=parameters, parameter_errors=errors,
-        flatness=flatness, steadiness=steadiness, held_out=held_out(fit, candidate.prediction, jacobian, prepared),
+        held_out=held_out(fit, candidate.prediction, jacobian, prepared),
     )  # fmt: skip
 
 

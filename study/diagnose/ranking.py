@@ -43,7 +43,7 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
     white = {r.name: np.concatenate(r.held_out.white(outputs, noise)) for r in rows}
     alone = evidence(before, held_out_of(comparison))
     test = held_out_test(comparison.fit, before, noise)
-    rows = [replace(_gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, r.term.tuned))) for r in rows]
+    rows = [replace(_gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, any(e.term.tuned for e in r.entries)))) for r in rows]
     return in_order(rows, white, asked)
 
 
@@ -106,8 +106,7 @@ def _tie(rows: Sequence[R], white: Mapping[str, Floats]) -> list[R]:
 
 def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
     """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
-    unknowns = len(row.term.components) + len(row.term.parameters)
-    return *_against(row, asked), unknowns, float(np.mean(white**2))
+    return *_against(row, asked), row.unknowns, float(np.mean(white**2))
 
 
 def _against(row: Ranked, asked: int) -> tuple[bool, bool]:

@@ -15,7 +15,7 @@ from study.records.states import starting_states
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
-from study.support.numbers import percent
+from study.support.numbers import enumerated, percent
 
 LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)
 DISTINCT = 5.0  # standard errors by which the responses must differ
@@ -75,10 +75,12 @@ def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
     rival = next((r for r in rows if r.name in tied), None)
     if rival is None:
         return ""
-    if rival.entry.place.path != rows[0].entry.place.path:
+    if {e.place.path for e in rival.entries} != {e.place.path for e in rows[0].entries}:
         return separating_sensor(rows[0], rival)
     level = separating_level(rows[0], rival, prepared)
-    names = f"{term_names(rows[0].term.name)} and {term_names(rival.term.name)}"
+    one, other = ([term_names(e.term.name) for e in row.entries if e.name not in without.names]
+                  for row, without in ((rows[0], rival), (rival, rows[0])))
+    names = f"{enumerated(one) or 'the smaller set'} and {enumerated(other) or 'the smaller set'}"
     if level is None:
         whole = prepared.response == "displacement"
         other = "another kind of test" if whole else "the displacement, its mean included,"

@@ -1,5 +1,6 @@
 """The whole diagnosis: try every candidate, and say what the record bears - no less, no more."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,16 +11,14 @@ from study.compare import dependence
 from study.compare.comparison import Comparison
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
-from study.diagnose import candidates, pairs
-from study.diagnose.candidates import Progress, with_best_settled
-from study.diagnose.constancy import changes, curves, wavers
+from study.diagnose import candidates
+from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
-from study.diagnose.pairs import Pair
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
+from study.diagnose.set_search import SetSearch, searched, worse
 from study.equations.linear_part import Modes, modes_of
-from study.equations.model import free
 from study.equations.possible_effects import candidate_entries
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
@@ -31,32 +30,44 @@ from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
-from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, K
 
-MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
+MISSING, SEVERAL, PARTLY = "missing_effect", "missing_effects", "partly_known"
+NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-PAIRED = 3  # the best so many candidates are tried together with every other
+CLOSE = 12  # sets near the best that are compared with it in every detail
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What is missing."""
 
-    verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
+    verdict: str  # ``missing_effect``, ``missing_effects``, ``partly_known``, ``nothing_missing`` or ``unknown_effect``
     comparison: Comparison  # the model as it was given, with its fit, its error and its noise floor
-    candidates: tuple[Ranked, ...]  # best first
+    candidates: tuple[Ranked, ...]  # single effects, best first
     asked: int  # effects at places
     left: float  # rms of what remains above the noise beside the best explanation, over the rms response
-    pair: tuple[str, ...]  # two effects that explain together what none does alone; empty otherwise
+    sets: tuple[Ranked, ...]  # the answer, and all others that the record cannot tell from the best; empty without any
     families: tuple[FamilyGain, ...]  # for an unknown effect: what functions of displacement, ... explain, best first
+
+    @property
+    def answer(self) -> Ranked | None:
+        """The effect or the set of effects that is missing, the one that is known in part included."""
+        return self.sets[0] if self.verdict in (MISSING, SEVERAL, PARTLY) else None
+
+    @cached_property
+    def included(self) -> dict[str, int]:
+        """In how many of the sets each effect is, the most frequent first."""
+        names = [name for row in self.sets for name in row.names]
+        return dict(sorted(((name, names.count(name)) for name in dict.fromkeys(names)), key=lambda item: -item[1]))
 
     @cached_property
     def modes_after(self) -> Modes | None:
-        """Modes with the first candidate, with their standard errors; None where no effect is named."""
-        if self.verdict != MISSING:
+        """Modes with what is missing, with their standard errors; None where no effect is named."""
+        if self.answer is None:
             return None
-        fit, prepared = self.candidates[0].fit, self.comparison.prepared
+        fit, prepared = self.answer.fit, self.comparison.prepared
         covariance = uncertainty(fit, prepared, linearise(fit, prepared))
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
@@ -68,19 +79,22 @@ def diagnose(
     without: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Find the effect that a model lacks, and its place.
+    """Find the effects that a model lacks, and their places.
 
     What the comparison's model held is held, the rest is fitted. ``extra`` are the user's own candidates, ``without``
     terms of the library to leave out; ``progress`` is called after each candidate that was fitted.
     """
     base = search_base(comparison)
-    entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
+    entries = candidate_entries(comparison.fit.model, extra, without)
     tried = candidates.try_all(entries, base, progress)
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    verdict, rows, left, pair = _decide(rows, base, comparison, asked)
-    families = dependence.families(dependence.unexplained(base)) if verdict == UNKNOWN else []
-    return Diagnosis(verdict, comparison, tuple(rows), asked, left, pair, tuple(families))
+    decision = _decide(rows, tried, base, comparison, asked)
+    unexplained = decision.verdict in (UNKNOWN, PARTLY)
+    families = dependence.families(dependence.unexplained(base)) if unexplained else []
+    return Diagnosis(
+        decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
+    )
 
 
 def search_part(prepared: Prepared) -> Prepared:
@@ -109,29 +123,86 @@ def _search_base(fit: FreeRunFit, look: Prepared) -> Baseline:
     return shape_search.baseline(again, look)
 
 
+@dataclass(frozen=True, eq=False)
+class _Decision:
+    verdict: str
+    rows: list[Ranked]  # single effects in their final order
+    left: float
+    sets: list[Ranked]
+
+
 def _decide(
-    rows: list[Ranked], base: Baseline, comparison: Comparison, asked: int
-) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
-    """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
-    prediction = comparison.prediction
-    own = held_out_of(comparison)
+    rows: list[Ranked], tried: Sequence[FittedCandidate], base: Baseline, comparison: Comparison, asked: int
+) -> _Decision:
+    """One effect that explains everything; else the set that does, as far as the record bears it."""
+    prediction, own = comparison.prediction, held_out_of(comparison)
     trusted = [r for r in rows if believed(r, prediction, own)]
-    if not trusted:
-        left = _left(comparison.fit, prediction)
-        # what is left along another motion tells nothing
-        lost = has_lost_the_motion(comparison.fit, comparison.prepared)
-        return (UNKNOWN if left > TOLERANCE or lost else NOTHING), rows, left, ()
-    first = trusted[0]
-    left = _left(first.fit, first.prediction)
-    rows = [first] + [r for r in rows if r is not first]
-    if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked):
-        return MISSING, rows, left, ()
-    slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
-    pair = None if slight or base.several else _explaining_pair(rows, base)
-    if pair is None:
-        return MISSING if _stands_out(first, comparison.prepared) else UNKNOWN, rows, left, ()
-    first = next(r for r in rows if r.name == pair.names[0])
-    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
+    first = trusted[0] if trusted else None
+    rows = rows if first is None else [first] + [r for r in rows if r is not first]
+    # what is left along another motion tells nothing
+    left = _left(comparison.fit, prediction) if first is None else _left(first.fit, first.prediction)
+    lost = has_lost_the_motion(comparison.fit, comparison.prepared)
+    if first is None and left <= TOLERANCE and not lost:
+        return _Decision(NOTHING, rows, left, [])
+    complete = first is not None and (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
+    alone = [] if first is None else [first, *(r for r in rows if r.name in first.tied_with)]
+    if first is not None and complete and first.unknowns <= 2:
+        return _Decision(MISSING, rows, left, alone)
+    fewer_than = first.unknowns if first is not None and complete else None
+    search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than)
+    sets = _ranked_sets(search, rows, comparison, asked)
+    answer = next((r for r in sets if believed(r, prediction, own)), None)
+    if answer is None or (complete and len(answer.entries) == 1):
+        verdict = MISSING if complete else UNKNOWN
+        return _Decision(verdict, rows, left, alone)
+    answer, left = _material(answer, sets, search, comparison)
+    sets = [answer, *(r for r in sets if r is not answer and (r.name in answer.tied_with))]
+    names = [r.name for r in rows]
+    order = {name: i for i, name in enumerate(answer.names)}
+    rows = sorted(rows, key=lambda r: (order.get(r.name, len(order)), names.index(r.name)))
+    kind = MISSING if len(answer.entries) == 1 else SEVERAL
+    explained = answer.gain.explained
+    if (explained >= ENOUGH or left <= GOOD) and not answer.wanders(asked):
+        return _Decision(kind, rows, left, sets)
+    if len(answer.entries) > 1 and explained >= NEARLY and not answer.unphysical:
+        return _Decision(kind, rows, left, sets)
+    if len(answer.entries) == 1 and _stands_out(answer, comparison.prepared):
+        return _Decision(kind, rows, left, sets)
+    if len(answer.entries) > 1 and explained >= MOST and not answer.unphysical:
+        return _Decision(PARTLY, rows, left, sets)
+    return _Decision(UNKNOWN, rows, left, sets)
+
+
+def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
+    """Sets near the best in their order, settled as they would be if they were added."""
+    alone = {row.name: row for row in rows}
+    every = sorted(search.tried.values(), key=worse)
+    best = every[0]
+    near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:CLOSE]
+    near += [c for names, c in search.tried.items() if c not in near and any(names < set(n.names) for n in near[:3])]
+    found = [alone.get(c.name, c) for c in near]
+    return rank(with_best_settled(found, comparison.prepared), comparison, asked + len(search.tried))
+
+
+def _material(
+    answer: Ranked, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
+) -> tuple[Ranked, float]:
+    """The set without effects that explain less than what is left beside all: they imitate a part of that."""
+    ranked = {frozenset(r.names): r for r in sets}
+    left = _left(answer.fit, answer.prediction)
+    while len(answer.entries) > 1:
+        names = frozenset(answer.names)
+        smaller = [c for name in names if (c := search.without(names, name)) is not None]
+        least = min(smaller, key=lambda c: c.prediction.error, default=None)
+        if least is None:
+            break
+        explains = math.sqrt(max(least.prediction.error**2 - answer.prediction.error**2, 0.0))
+        if explains >= left:
+            break
+        fewer = ranked.get(frozenset(least.names))
+        answer = fewer if fewer is not None else rank([least], comparison, len(search.tried))[0]
+        left = _left(answer.fit, answer.prediction)
+    return answer, left
 
 
 def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
@@ -153,38 +224,6 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     """
     alone = prepared.response == FORCE or prepared.free
     return alone and first.gain.explained > MOST and not first.unphysical
-
-
-def _explaining_pair(rows: list[Ranked], base: Baseline) -> Pair | None:
-    """Two effects that explain together what the first does not alone, or None.
-
-    First the best of those that the reverse system puts first; then the first candidates with every other.
-    """
-    pair = pairs.best_pair(rows, base)
-    if pair is not None and _explains(pair, rows, base.prepared):
-        return pair
-    for row in rows[:PAIRED]:
-        others = [free(r.term, r.entry.place) for r in rows if r.name != row.name]
-        seconds = candidates.try_all(others, _search_base(row.fit, base.prepared))
-        second = min(seconds, key=lambda c: float(c.prediction.residual @ c.prediction.residual), default=None)
-        if second is not None:
-            pair = Pair((row.name, second.name), second.fit, second.prediction)
-            if _explains(pair, rows, base.prepared):
-                return pair
-    return None
-
-
-def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
-    """Whether a pair leaves nothing but noise, does more than the first alone, and neither coefficient moves."""
-    prediction = pair.prediction
-    more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < ALPHA
-    if not more or _left(pair.fit, prediction) > GOOD:
-        return False
-    jacobian = linearise(pair.fit, prepared)
-    followed = [curves(pair.fit, r.entry, prepared.dt, jacobian) for r in rows if r.name in pair.names]
-    if prediction.error <= GOOD:
-        return all(changes(*both) <= UNSTEADY for both in followed)
-    return not any(wavers(steadiness, len(rows)) for _, steadiness in followed)
 
 
 def _left(fit: FreeRunFit, prediction: Prediction) -> float:

@@ -141,8 +141,9 @@ def undone(session: Session) -> Session:
 
 
 def candidate(session: Session, name: str) -> Ranked:
-    """The candidate of this name in the present diagnosis, which must have one."""
-    for row in session.now.diagnosis.candidates if session.now.diagnosis is not None else ():
+    """The effect or set of this name in the present diagnosis, which must have one."""
+    diagnosis = session.now.diagnosis
+    for row in (*diagnosis.sets, *diagnosis.candidates) if diagnosis is not None else ():
         if row.name == name:
             return row
     raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
@@ -292,7 +293,7 @@ def tried(session: Session, text: str) -> Session:
         return replace(session, own=(*session.own, term))
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [FittedCandidate(r.entry, r.fit, r.prediction) for r in now.diagnosis.candidates]
+    known = [FittedCandidate(r.entries, r.fit, r.prediction) for r in now.diagnosis.candidates]
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response

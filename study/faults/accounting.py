@@ -48,6 +48,24 @@ class Accounted:
 
     comparison: Comparison
     faults: tuple[Fault, ...]
+    given: Prepared  # the record as it was before any correction
+    known: Held  # values of faults that the user gave
+    switched_off: tuple[str, ...]  # faults that are not looked for
+    as_sampled: bool  # whether all samples are used
+
+    def beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
+        """The faults that the record shows beside a fuller model, which begins at a fit of it."""
+        found = accounted(
+            model, self.given, held=self.known, switched_off=self.switched_off, as_sampled=self.as_sampled, near=fit
+        )
+        return found.faults
+
+    def corrected_for(self, faults: Sequence[Fault]) -> "Accounted":
+        """The comparison of the same model with the record corrected for other faults."""
+        needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if self.as_sampled else without_spare_samples
+        prepared = needed(corrected(self.given, faults))
+        prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
+        return replace(self, comparison=compare(self.comparison.model, prepared), faults=tuple(faults))
 
 
 def accounted(
@@ -59,6 +77,7 @@ def accounted(
     estimator: str = FREE_RUN,
     progress: Callable[[str], None] | None = None,
     as_sampled: bool = False,
+    near: FreeRunFit | None = None,
 ) -> Accounted:
     """Compare a model with a record, the faults of the measurement accounted for.
 
@@ -75,6 +94,8 @@ def accounted(
         Faults that are not looked for.
     as_sampled : bool
         Whether all samples are used, whether the motion asks for them or not.
+    near : FreeRunFit, optional
+        A fit of the model where the search begins; from nothing if left out.
 
     Returns
     -------
@@ -86,7 +107,14 @@ def accounted(
     StudyError
         If the model cannot be fitted.
     """
-    given = held_in(prepared, held or {})
+    given, begin = held_in(prepared, held or {}), None
+    if near is not None:
+        values = near.model.numbers()
+        begin = {key: values[key] for key, value in model.values.items() if value is None}
+
+    def result(comparison: Comparison, faults: tuple[Fault, ...]) -> Accounted:
+        return Accounted(comparison, faults, prepared, held or {}, tuple(switched_off), as_sampled)
+
     asked = asked_of(prepared, [name for name in FAULTS if name not in switched_off], given)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
     if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE or model.modal):
@@ -98,10 +126,10 @@ def accounted(
     first = corrected(prepared, faults)
     fewer = needed(first)
     if not asked:
-        return _compared(model, fewer, faults, None, estimator, progress)
+        return result(_compared(model, fewer, faults, None, estimator, progress), faults)
     late: Refined | None = None
     try:
-        fit = fit_model(model, fewer)
+        fit = fit_model(model, fewer, begin)
     except StudyError:  # forces and motion too far apart in time let a structure escape
         late = _late_response(model, prepared, None, faults, asked, needed)
         if late is None:
@@ -119,11 +147,11 @@ def accounted(
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
-        return _compared(model, fewer, end.faults, fit, estimator, progress)
+        return result(_compared(model, fewer, end.faults, fit, estimator, progress), end.faults)
     final = corrected(prepared, end.faults)
     kept = needed(final)
     best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
-    return _compared(model, kept, end.faults, best, estimator, progress)
+    return result(_compared(model, kept, end.faults, best, estimator, progress), end.faults)
 
 
 def _beneath_too(
@@ -262,12 +290,12 @@ def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:
 def _compared(
     model: Model, prepared: Prepared, faults: tuple[Fault, ...], fit: FreeRunFit | None, estimator: str,
     progress: Callable[[str], None] | None,
-) -> Accounted:  # fmt: skip
+) -> Comparison:  # fmt: skip
     """The comparison with a corrected record, which says so in its notes; ``fit`` is the fit to it, if there is one."""
     if faults:
         prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
     again = fit if estimator == FREE_RUN else None
-    return Accounted(compare(model, prepared, search=again, estimator=estimator, progress=progress), faults)
+    return compare(model, prepared, search=again, estimator=estimator, progress=progress)
 
 
 def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> tuple[Fault, ...]:

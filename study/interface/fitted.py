@@ -14,6 +14,7 @@ from study.compare.fitted_coefficients import Coefficient
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
+from study.faults.accounting import Accounted
 from study.faults.fault import Fault, Given, settings_asked
 from study.interface.data import Record
 from study.interface.equation import Model, Samples, Times
@@ -63,11 +64,14 @@ class Fit(FitPictures):
         Faults of the measurement that the record is corrected for.
     separate : tuple of Separate
         Coefficients that may differ between the records.
+    asked : Accounted, optional
+        The record before it was corrected, and what was asked of it; None of a fit that begins with one corrected.
     """
 
     comparison: Comparison
     faults: tuple[Fault, ...] = ()
     separate: tuple[Separate, ...] = ()
+    asked: Accounted | None = None
 
     @property
     def model(self) -> Model:
@@ -353,7 +357,7 @@ def fitted(
     found = compare_records(asked, equation, layout, settings, absolute=absolute, estimator=estimator)
     prepared = found.comparison.prepared
     of_all = replace(prepared.record, name=", ".join(one.name for one in asked))
-    return Fit(replace(found.comparison, prepared=replace(prepared, record=of_all)), found.faults, separate)
+    return Fit(replace(found.comparison, prepared=replace(prepared, record=of_all)), found.faults, separate, found)
 
 
 def records_of(given: object) -> list[Record]:

@@ -1,10 +1,10 @@
 """Which effect is missing: the diagnosis of a fit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from study.diagnose import diagnosis_report
+from study.diagnose import confirmed_faults, diagnosis_report
 from study.diagnose import verdict as verdicts
 from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.diagnosis_files import diagnosis_in_words
@@ -104,7 +104,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """``missing_effect``, ``nothing_missing`` or ``unknown_effect``."""
+        """``missing_effect``, ``missing_effects``, ``partly_known``, ``nothing_missing`` or ``unknown_effect``."""
         return self.result.verdict
 
     @property
@@ -114,13 +114,14 @@ class Diagnosis:
 
     @property
     def best(self) -> Candidate | None:
-        """The missing effect; None unless the verdict is that one is missing."""
-        return self.candidates[0] if self.verdict == MISSING else None
+        """What is missing, an effect or a set of effects; None unless the verdict names one."""
+        answer = self.result.answer
+        return None if answer is None else Candidate(answer, answer.unit)
 
     @property
-    def pair(self) -> tuple[str, ...]:
-        """Two effects that explain together what none does alone; empty otherwise."""
-        return self.result.pair
+    def sets(self) -> tuple[Candidate, ...]:
+        """The answer, and all other effects and sets of effects that the record cannot tell from the best."""
+        return tuple(Candidate(r, r.unit) for r in self.result.sets)
 
     def __getitem__(self, name: str) -> Candidate:
         """The candidate of this name; a ``StudyError`` if there is none."""
@@ -187,5 +188,9 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
         terms.get(name)
     extra = [terms.custom(name, formula) for name, formula in own.items()]
     check_on(fit.comparison.record, extra)
-    result = diagnose_as_read(fit.comparison, extra=extra, without=tuple(without))
-    return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))
+    if fit.asked is None:
+        result = diagnose_as_read(fit.comparison, extra=extra, without=tuple(without))
+        return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))
+    asked = replace(fit.asked, comparison=fit.comparison, faults=fit.faults)
+    found = confirmed_faults.diagnosed(asked, extra=extra, without=tuple(without))
+    return Diagnosis(found.diagnosis, found.faults, Words(diagnosis_in_words(found.diagnosis)))

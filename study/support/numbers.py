@@ -1,6 +1,7 @@
 """Numbers as a reader wants them."""
 
 import math
+from collections.abc import Sequence
 
 SMALLEST, LARGEST = 1e-50, 1e50  # of a value: no unit makes one beyond, and the square of one beyond may be no number
 LAST_DIGITS = 1e-9  # relative: what two numbers that were written, converted or added up may differ by and be one
@@ -27,3 +28,9 @@ def by_chance(p_value: float) -> str:
         return "chance alone would do as much in fewer than 1 of 1000 records"
     of = 1000 if p_value < 0.01 else 100
     return f"chance alone would do as much in about {p_value * of:.0f} of {of} records"
+
+
+def enumerated(words: Sequence[str]) -> str:
+    """Words in a row: ``a``, ``a and b``, ``a, b and c``; empty for none."""
+    *first, last = words or [""]
+    return f"{', '.join(first)} and {last}" if first else last

@@ -12,7 +12,7 @@ from study.compare.prediction import predict
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.equations.model import Model
-from study.faults.fault import Fault
+from study.faults.accounting import Accounted
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared, prepare_record
@@ -25,10 +25,9 @@ Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
 FAR_BEHIND = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
-def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]:
+def compared(trial: Trial, model: Model) -> Accounted:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
-    found = compare_records([trial.record], model)
-    return found.comparison, found.faults
+    return compare_records([trial.record], model)
 
 
 def diagnosed_structure(trial: Trial) -> Diagnosis:
@@ -40,8 +39,7 @@ def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
     """The effects that the record cannot tell apart, the one put first among them; empty where none is named."""
     if diagnosis.verdict != MISSING:
         return ()
-    first = diagnosis.candidates[0]
-    return (first.name, *first.tied_with)
+    return tuple(row.name for row in diagnosis.sets)
 
 
 def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
@@ -103,7 +101,7 @@ def fault_shown(trial: Trial, found: Sequence[str]) -> str:
     if not imposed or imposed in found:
         return "yes" if imposed else ""
     try:
-        seen = [fault.fault for fault in compared(trial, trial.completed)[1]]
+        seen = [fault.fault for fault in compared(trial, trial.completed).faults]
     except StudyError:
         seen = []
     return "yes" if imposed in seen else "no"

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from study.diagnose.adding import added
-from study.diagnose.confirmed_faults import confirmed
+from study.diagnose.confirmed_faults import diagnosed
 from study.diagnose.verdict import NOTHING, diagnose
 from study.faults.fault import FAULTS, fault_fields
 from study.records.record import MOTIONS
@@ -142,20 +142,22 @@ def table_of(order: Order) -> str:
 
 
 def _judged_driven(order: Order, trial: Trial) -> Row:
-    before, faults = compared(trial, trial.completed if order.kind == COMPLETED else trial.believed)
-    diagnosis = diagnose(before, without=order.hidden or () if order.kind == REMOVED else ())
+    begun = compared(trial, trial.completed if order.kind == COMPLETED else trial.believed)
+    found = diagnosed(begun, without=order.hidden or () if order.kind == REMOVED else ())
+    diagnosis, before = found.diagnosis, found.diagnosis.comparison
     named = tie_set(diagnosis)
+    together = diagnosis.answer.names if diagnosis.answer is not None and not named else ()
     after = added(before, diagnosis.candidates[0].term) if named else before
-    found = [fault_fields(fault) for fault in confirmed(faults, diagnosis)]
+    seen = [fault_fields(fault) for fault in found.faults]
     row: Row = {
-        "fault_shown": findings.fault_shown(trial, [str(field["fault"]) for field in found]),
+        "fault_shown": findings.fault_shown(trial, [str(field["fault"]) for field in seen]),
         "verdict": diagnosis.verdict, "first": next((c.name for c in diagnosis.candidates), ""),
-        "tie_set": "+".join(named), "tie_size": len(named), "pair": "+".join(diagnosis.pair), "left": diagnosis.left,
+        "tie_set": "+".join(named), "tie_size": len(named), "pair": "+".join(together), "left": diagnosis.left,
         "error_before": before.prediction.error, "error_after": after.prediction.error,
         "error_true": findings.error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
         "noise_floor": before.prediction.floor,
     }  # fmt: skip
-    row |= findings.evidence_row(diagnosis, trial.hidden) | findings.measurement(found, trial.fault)
+    row |= findings.evidence_row(diagnosis, trial.hidden) | findings.measurement(seen, trial.fault)
     row |= intervals(after, trial.truth)
     if named and order.kind == PAIR:
         second = diagnose(after)
@@ -173,7 +175,7 @@ def _judged_test(_: Order, trial: Trial) -> Row:
 
     Of a record without noise nothing is asked: there an interval is as wide as rounding.
     """
-    diagnosis = diagnose(compared(trial, trial.believed)[0])
+    diagnosis = diagnosed(compared(trial, trial.believed)).diagnosis
     named = tie_set(diagnosis)
     right = bool(named) and set(named) >= set(trial.hidden) if trial.hidden else diagnosis.verdict == NOTHING
     row: Row = {
@@ -182,7 +184,7 @@ def _judged_test(_: Order, trial: Trial) -> Row:
         "error_after": diagnosis.candidates[0].prediction.error if named else "",
     }  # fmt: skip
     if trial.noise > 0.0:
-        true = compared(trial, trial.completed)[0]
+        true = compared(trial, trial.completed).comparison
         standing = [abs(c.value) / c.error for c in true.coefficients if c.term in trial.hidden and c.error]
         row |= {"shown": round(standing[0], 1) if standing else ""} | intervals(true, trial.truth)
     return row

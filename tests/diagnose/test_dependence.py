@@ -6,7 +6,7 @@ import pytest
 from study import trials
 from study.compare import dependence
 from study.compare.comparison import compare
-from study.diagnose import candidates, constancy, pair_screening, pairs
+from study.diagnose import candidates, constancy, set_screening, set_search
 from study.diagnose.ranking import rank
 from study.equations.model import free
 from study.equations.simulate import Integrator, simulate
@@ -68,18 +68,22 @@ def two_effects():
     return made, prepared, base, rank(tried, comparison)
 
 
-def test_both_of_two_effects_are_the_best_pair(two_effects):
+def test_both_of_two_effects_are_the_best_set_of_two(two_effects):
     made, _, base, rows = two_effects
-    best = pairs.best_pair(rows, base)
-    assert best is not None
-    assert set(best.names) == set(made.hidden)
+    search = set_search.searched(base, rows, lambda _: True)
+    assert set(search.sets(2)[0].names) == set(made.hidden)
+    assert not search.sets(3)  # two leave nothing
 
 
-def test_each_way_of_preselecting_names_the_pair(two_effects):
+def test_each_way_of_screening_names_the_two(two_effects):
     made, _, base, rows = two_effects
-    starts = pair_screening.promising_pairs(rows, base)
-    assert sum(set(start.names) == set(made.hidden) for start in starts) == 2
-    assert all(value is not None for start in starts for value in start.model.values.values())
+    offered = {r.name: next(t for t in r.fit.model.terms if t.name == r.name) for r in rows}
+    for found in (
+        set_screening.beside(None, offered, base, [2], 1),
+        set_screening.by_the_reverse_system(offered, base, [2], 1),
+    ):
+        assert found[2][0].names == set(made.hidden)
+        assert all(value is not None for value in found[2][0].model.values.values())
 
 
 def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():

@@ -223,7 +223,8 @@ def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     diagnosis = diagnosed(made.believed, made.record, without=few)
     assert diagnosis.comparison.prediction.diverged
     assert diagnosis.comparison.prediction.error == pytest.approx(1.0)
-    assert set(diagnosis.pair) == {"displacement_damping", "quadratic_damping"}
+    assert diagnosis.answer is not None
+    assert set(diagnosis.answer.names) == {"displacement_damping", "quadratic_damping"}
     assert "does not stay finite" in diagnosis_sentences(diagnosis)[0]
 
 

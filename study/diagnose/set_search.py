@@ -1,0 +1,131 @@
+"""The search over sets of effects: each set is fitted once, in free run, and all that is asked of sets is asked here.
+
+A set of one size begins where the best of the size below ended; which are worth a fit the sensitivities there say, and
+the reverse system. Effects come, go and change places with others: what a smaller set had, a larger one need not have.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from study.diagnose import set_screening
+from study.diagnose.candidates import FittedCandidate, judged_candidate
+from study.diagnose.set_screening import SetStart
+from study.equations.model import ModelTerm
+from study.identify.time_domain.fit_model import TRIED, grown_states
+from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.shape_search import Baseline
+from study.support import statistics
+from study.support.cores import side_by_side
+from study.support.errors import StudyError
+from study.support.thresholds import ALPHA
+
+MOST = 4  # effects in a set
+EACH = 6  # sets of a size that are fitted from one beginning
+Progress = Callable[[int, int, int], None]  # called with the size of the sets, how many were fitted, and of how many
+
+
+@dataclass(frozen=True, eq=False)
+class SetSearch:
+    """Sets of effects beside a fitted model, by their names."""
+
+    base: Baseline  # the model
+    entries: dict[str, ModelTerm]  # the effects and their places
+    offered: dict[str, ModelTerm]  # the same with the shape parameters at which each was best alone
+    tried: dict[frozenset[str], FittedCandidate] = field(default_factory=dict[frozenset[str], FittedCandidate])
+
+    def sets(self, size: int) -> list[FittedCandidate]:
+        """Sets of so many effects that were fitted, the best first; those that are no physical effects come last."""
+        return sorted((c for names, c in self.tried.items() if len(names) == size), key=worse)
+
+    def fit(self, starts: Iterable[SetStart], progress: Callable[[int, int], None] | None = None) -> None:
+        """Fit sets; of a set that was fitted before the better fit stays."""
+        listed = list(starts)
+        for count, found in enumerate(side_by_side(self._fitted, listed), start=1):
+            if found is not None:
+                names = frozenset(found.names)
+                self.tried[names] = min(found, self.tried.get(names, found), key=worse)
+            if progress is not None:
+                progress(count, len(listed))
+
+    def _fitted(self, start: SetStart) -> FittedCandidate | None:
+        prepared, begun = self.base.prepared, self.base.fit if start.beside is None else start.beside.fit
+        try:
+            fit = fit_part(
+                start.model, prepared, self.base.fit.held, steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
+                max_iterations=TRIED, initial=grown_states(begun, start.model),
+            )
+            return judged_candidate(tuple(e for n, e in self.entries.items() if n in start.names), fit, prepared)
+        except StudyError:
+            return None
+
+    def without(self, names: frozenset[str], name: str) -> FittedCandidate | None:
+        """The set without one of its effects, fitted if it was not."""
+        fewer = names - {name}
+        if fewer and fewer not in self.tried:
+            whole = self.tried[names]
+            self.fit([SetStart(fewer, whole.fit.model.without_term(name), whole)])
+        return self.tried.get(fewer)
+
+
+def worse(candidate: FittedCandidate) -> tuple[bool, float]:
+    """Order among sets of one size."""
+    return bool(candidate.unphysical), candidate.power
+
+
+def searched(
+    base: Baseline, singles: Sequence[FittedCandidate], done: Callable[[FittedCandidate], bool],
+    fewer_than: int | None = None, progress: Progress | None = None,
+) -> SetSearch:  # fmt: skip
+    """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
+
+    ``singles`` are the effects as fitted alone. ``done`` says whether a set leaves nothing to be explained;
+    ``fewer_than`` are the unknowns of an effect that leaves nothing alone: then sets of simple effects with fewer are
+    asked for.
+    """
+    offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
+    search = SetSearch(base, {c.name: c.entry for c in singles}, offered, {frozenset(c.names): c for c in singles})
+    sizes = range(2, MOST + 1)
+    reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
+    best = search.sets(1)[0] if singles else None
+    for size in sizes:
+        if best is None or (fewer_than is not None and size >= fewer_than):
+            break
+        starts = list(reverse.get(size, ()))
+        for parent in _parents(search.sets(size - 1), simple=fewer_than is not None):
+            starts += set_screening.beside(parent, offered, base, [size], EACH)[size]
+        if size == 2:
+            starts += set_screening.beside(None, offered, base, [size], EACH)[size]
+        report = None if progress is None else partial(progress, size)
+        search.fit(starts, report)
+        for parent in _parents(search.sets(size), simple=fewer_than is not None):  # one may change places with another
+            exchanged = set_screening.beside(parent, offered, base, [size], EACH)[size]
+            search.fit([start for start in exchanged if start.names not in search.tried], report)
+        larger = search.sets(size)
+        if not larger or not gains(best, larger[0], len(starts)):
+            break
+        best = larger[0]
+        if fewer_than is None and done(best):
+            fewer_than = best.unknowns
+    for names in [frozenset(c.names) for size in sizes for c in search.sets(size)[:2]]:
+        for name in names:
+            search.without(names, name)
+    return search
+
+
+def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:
+    """Whether a larger set, the best of so many, leaves less of what neither was fitted to, and not by chance."""
+    if smaller.prediction.prepared.record.stretches:
+        one, other = (np.concatenate([c.fit.residual, c.prediction.residual]) for c in (smaller, larger))
+    else:
+        one, other = smaller.prediction.residual, larger.prediction.residual
+    return statistics.gain(one, other).p_value * asked < ALPHA
+
+
+def _parents(sets: Sequence[FittedCandidate], *, simple: bool) -> list[FittedCandidate]:
+    """The best set and the best of simple effects; flexible ones imitate what several simple ones do together."""
+    plain = next((c for c in sets if not c.flexible), None)
+    parents = [plain] if simple else [next(iter(sets), None), plain]
+    return list({id(c): c for c in parents if c is not None}.values())
