@@ -61,9 +61,8 @@ class Truth:
         ``found_elsewhere`` are hidden ones that a fault of the measurement stands for.
         """
         hidden = [name for name in self.added if name not in found_elsewhere]
-        same = np.array([[self.same(entry, name) for name in hidden] for entry in named]).reshape(
-            len(named), len(hidden)
-        )
+        pairs = [self.same(entry, name) for entry in named for name in hidden]
+        same = np.array(pairs, dtype=bool).reshape(len(named), len(hidden))
         count = int(np.sum(same[linear_sum_assignment(same, maximize=True)]))
         return count, len(hidden) - count
 

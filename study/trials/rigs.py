@@ -23,7 +23,7 @@ from study.identify.frequency_domain.inputs import relative_record
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.arrays import Floats
-from study.support.errors import expect
+from study.support.errors import StudyError, expect
 from study.support.least_squares import length_or_one
 from study.trials import effects
 from study.trials.effects import HIDDEN, LATER, Asked, Rig, Shares, Sizing, evenly_in_log
@@ -88,10 +88,18 @@ def rig_of_real_kind(rng: np.random.Generator, asked: Asked, make: Callable[...,
         return unit, float(rng.uniform(*RANGES.error))
 
     def strength(unit: ModelTerm, model: Model) -> tuple[float, float]:
-        """Rms that a unit of an effect adds to the response beside all else, and that of the response."""
+        """Rms that a unit of an effect adds to the response beside all else, and that of the response.
+
+        Where so much of the effect stops the motion or lets it escape, that is far more than any is to add.
+        """
         amount = next((t.coefficients for t in model.terms if t.name == unit.name), None)
         grown = model if amount else model.with_term(replace(unit, coefficients=(0.0,) * len(unit.coefficients)))
-        return added_response(setup, grown, setup.respond(grown), unit), 1.0
+        try:
+            return added_response(setup, grown, setup.respond(grown), unit), 1.0
+        except StudyError:
+            if not amount:
+                raise
+            return 10.0 / float(np.linalg.norm([c or 0.0 for c in amount])), 1.0
 
     def recorded(truth: Model, _: Shares) -> tuple[Record, Shares]:
         record = setup.respond(truth)
@@ -112,7 +120,7 @@ def rig_of_real_kind(rng: np.random.Generator, asked: Asked, make: Callable[...,
             record = replace(record, units={**record.units, "displacement": "rad", "force": "N m"})
         return record, shares
 
-    rig = Rig(setup.base, effect, lambda model: model, strength, recorded, Sizing(12, close=0.1, secant=True), {})
+    rig = Rig(setup.base, effect, lambda model: model, strength, recorded, Sizing(7, close=0.1, secant=True), {})
     if not asked.hidden or rng.random() >= RANGES.unknown:
         return rig
     unit, size = _remainder(rng, setup, asked.hidden), float(rng.uniform(*RANGES.remainder))
