@@ -17,8 +17,7 @@ from study.support.errors import DivergenceError, StudyError, expect
 from study.trials.driven import LABORATORIES, REPORT_LIKE, driven_rig
 from study.trials.effects import HIDDEN, Asked, Rig, grown
 from study.trials.kinds import POSSIBLE, TESTS, rig_of_a_test
-from study.trials.rigs import NOISES as RIG_NOISES
-from study.trials.rigs import RIG_KINDS
+from study.trials.rigs import RIG_KINDS, RIG_NOISES
 from study.trials.structures import structure_rig
 
 # Kinds of test, beside those of ``kinds``: a force on mass and spring, and on masses between springs.

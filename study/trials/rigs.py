@@ -32,7 +32,7 @@ from study.trials.structures import SHAKER, random_structure
 
 
 @dataclass(frozen=True)
-class Ranges:
+class RigRanges:
     """What trials like real rigs are drawn from."""
 
     counts: tuple[float, ...] = (0.12, 0.2, 0.33, 0.25, 0.1)  # chances of no, one, ... four effects
@@ -46,8 +46,8 @@ class Ranges:
     dampings: tuple[float, float] = (0.004, 0.05)  # share of the critical damping
 
 
-RANGES = Ranges()
-NOISES = tuple(rms**2 for rms in (0.003, 0.005, 0.01, 0.02, 0.03))  # mean squares
+RANGES = RigRanges()
+RIG_NOISES = tuple(rms**2 for rms in (0.003, 0.005, 0.01, 0.02, 0.03))  # mean squares
 REMAINDER = "remainder"
 # Effects that differ little along any one motion: at most one of each is drawn.
 ALIKE = (
@@ -59,7 +59,7 @@ ALIKE = (
     ("quadratic_stiffness", "bilinear_stiffness", "constant_force"),
     ("dead_band", "one_sided_contact"),
 )
-SHAPES = (  # of a remainder; a and b are one over a typical displacement and velocity
+REMAINDERS = (  # of a remainder; a and b are one over a typical displacement and velocity
     "tanh({a}*u)*tanh({b}*v)**2", "sin({a}*u + {b}*v)", "tanh({b}*v)*cos({a}*u)", "stribeck_friction", "cogging",
 )  # fmt: skip
 
@@ -173,7 +173,7 @@ def _placed(rng: np.random.Generator, term: Term, base: Model) -> ModelTerm:
 
 def _remainder(rng: np.random.Generator, setup: Setup, hidden: Sequence[str]) -> ModelTerm:
     """A force that no candidate is, of unit size, drawn at a place."""
-    shape = str(rng.choice([s for s in SHAPES if s not in hidden]))
+    shape = str(rng.choice([s for s in REMAINDERS if s not in hidden]))
     if shape in LIBRARY:
         entry = _placed(rng, get(shape), setup.base)
         return effects.drawn_effect(rng, entry, setup.along(entry.place))[0]

@@ -13,7 +13,7 @@ from study.support.errors import StudyError
 from study.trials import make_trial, rates
 from study.trials.effect_sets import Truth, truth_of
 from study.trials.kept import KEPT_TABLES, LIKE_RIGS
-from study.trials.rigs import ALIKE, NOISES, RANGES, RIG_KINDS
+from study.trials.rigs import ALIKE, RANGES, RIG_KINDS, RIG_NOISES
 from study.trials.runs import rig_orders, run_trial
 from study.way_in.compare_records import compare_records
 
@@ -33,7 +33,7 @@ def test_each_kind_hides_what_it_says_and_is_the_same_again(test: str) -> None:
     assert one.truth == again.truth
     low, high = RANGES.kept
     assert all(low <= share <= high for share in one.shares)
-    assert one.noise in NOISES
+    assert one.noise in RIG_NOISES
     known = {entry.name for entry in one.believed.terms}
     left = {entry.name for entry in one.truth.terms} - known - set(one.hidden)
     assert len(left) == ("remainder" in one.about)
@@ -54,7 +54,7 @@ def test_none_to_four_effects_are_drawn_and_no_two_that_differ_little(test: str)
 
 def test_an_effect_that_is_left_out_leaves_the_error_that_was_asked_for() -> None:
     """... when everything else is fitted again: the linear estimate of it holds."""
-    trial = make_trial(4, ("quadratic_damping", "cubic_stiffness"), NOISES[0], test="rig_noise")
+    trial = make_trial(4, ("quadratic_damping", "cubic_stiffness"), RIG_NOISES[0], test="rig_noise")
     for name, share in zip(trial.hidden, trial.shares, strict=True):
         without = trial.completed.without_term(name)
         assert compare_records([trial.record], without).comparison.prediction.error == pytest.approx(share, rel=0.35)
@@ -62,7 +62,7 @@ def test_an_effect_that_is_left_out_leaves_the_error_that_was_asked_for() -> Non
 
 @pytest.fixture(scope="module")
 def swings() -> Truth:
-    trial = make_trial(9, ("quadratic_damping", "quadratic_stiffness"), NOISES[0], test="rig_decay")
+    trial = make_trial(9, ("quadratic_damping", "quadratic_stiffness"), RIG_NOISES[0], test="rig_decay")
     return truth_of(trial)
 
 
@@ -82,7 +82,7 @@ def test_effects_that_are_one_along_a_motion_count_as_one(swings: Truth) -> None
 def test_an_effect_at_another_place_is_another_one() -> None:
     hidden = ("cubic_stiffness",)
     for seed in range(1, 20):
-        trial = make_trial(seed, hidden, NOISES[0], "displacement", test="rig_structure")
+        trial = make_trial(seed, hidden, RIG_NOISES[0], "displacement", test="rig_structure")
         if "remainder" not in trial.about:
             break
     truth, (true,) = truth_of(trial), trial.effects
