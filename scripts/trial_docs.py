@@ -35,5 +35,5 @@ def main(docs: Path, name: str, wanted: Mapping[str, Sequence[float]], newest: P
 if __name__ == "__main__":
     with one_sentence():
         targets = load_config(Path("config")).settings.trials.wanted.plain()
-        for table in sys.argv[1:2] or PAGES:
+        for table in sys.argv[1:2] or [name for name in PAGES if (Path("docs") / f"{name}.csv").is_file()]:
             main(Path("docs"), table, targets, Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -32,7 +32,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--test", metavar="KIND",
-        help="another kind of test than a force on mass and spring: free_decay, blows, base, component or axis",
+        help="another kind of test than a force on mass and spring: free_decay, blows, base, component or axis; or a "
+        "rig with several effects and a remainder: rig_noise, rig_multisine, rig_sweep, rig_stepped, rig_blows, "
+        "rig_decay, rig_axis, rig_component or rig_structure",
     )  # fmt: skip
     parser.add_argument(
         "--coordinates",

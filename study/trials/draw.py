@@ -17,6 +17,7 @@ from study.support.errors import DivergenceError, StudyError, expect
 from study.trials.driven import LABORATORIES, REPORT_LIKE, driven_rig
 from study.trials.effects import HIDDEN, Asked, Rig, grown
 from study.trials.kinds import POSSIBLE, TESTS, rig_of_a_test
+from study.trials.rigs import RIG_KINDS, RIG_NOISES
 from study.trials.structures import structure_rig
 
 # Kinds of test, beside those of ``kinds``: a force on mass and spring, and on masses between springs.
@@ -137,8 +138,11 @@ def _attempt(rng: np.random.Generator, asked: Asked, test: str) -> Trial:
         truth, shares[unit.name] = grown(truth.without_term(unit.name), unit, target, rig)
     record, carried = rig.recorded(truth, tuple(shares[unit.name] for unit, _ in effects))
     name, hidden = f"{family.stem}_{asked.seed}", tuple(unit.name for unit, _ in effects)
+    known = rig.base
+    for beside in rig.unknown:
+        known = known.without_term(beside)
     return Trial(
-        replace(record, name=name), _nothing_known(rig.base, name), truth, hidden, asked.noise, carried, test,
+        replace(record, name=name), _nothing_known(known, name), truth, hidden, asked.noise, carried, test,
         asked.response, rig.about,
     )  # fmt: skip
 
@@ -184,5 +188,11 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
             STRUCTURE, (2027,), HIDDEN, lambda rng: (rng.choice(HIDDEN),), NOISES[:3], ("displacement", "acceleration"),
             structure_rig, anyway=True,
         ),
+        **{
+            name: Family(
+                name, (2028, *name.encode()), kind.possible, kind.drawn, RIG_NOISES, kind.motions, kind.rig
+            )
+            for name, kind in RIG_KINDS.items()
+        },
     }
 )  # fmt: skip

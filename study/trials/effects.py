@@ -69,6 +69,7 @@ class Rig:
     recorded: Callable[[Model, Shares], tuple[Any, Shares]]
     sizing: Sizing
     about: Mapping[str, Any]  # how it is driven and sampled, as a table says it
+    unknown: tuple[str, ...] = ()  # terms of the base that its owner knows nothing of, and no candidate is
 
 
 def evenly_in_log(rng: np.random.Generator, low: float, high: float) -> float:

@@ -12,12 +12,13 @@ from study.support.numbers import SAME_RUN
 
 Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
+LIKE_RIGS = "trials_like_rigs"
 TIMES = ("seconds",)  # of another machine, or another hour
 COLUMNS_OF_WORDS = (  # the others hold numbers
     "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
     "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
     "place_first", "tied", "tie_set", "tie_holds", "second_verdict", "second_tie_set", "whole_tie_set", "pair",
-    "trouble",
+    "remainder", "named", "sets", "trouble",
 )  # fmt: skip
 
 
@@ -57,6 +58,14 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "trouble",
             ),
             ("left", "p_value", "error_true"),
+        ),
+        LIKE_RIGS: KeptTable(
+            (
+                "test", "seed", "hidden", "place", "share", "remainder", "remainder_error", "noise", "response",
+                "verdict", "named", "named_count", "there", "right", "sets", "holds", "faults_found", "error_before",
+                "error_after", "error_true", "noise_floor", "seconds", "trouble",
+            ),
+            ("sets", "holds", "error_after", "error_true", "trouble"),
         ),
     }
 )  # fmt: skip

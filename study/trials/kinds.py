@@ -88,7 +88,7 @@ def _per_unit_mass(model: Model) -> Model:
     return model.with_values({key: value / values["m"] for key, value in values.items()})
 
 
-def _run(
+def response_to(
     model: Model, force: Floats, dt: float, initial: Sequence[float] = (0.0, 0.0), motions: Sequence[str] = MOTIONS
 ) -> Record:
     """The motion of a model under a force, friction's switches met exactly."""
@@ -107,22 +107,24 @@ def _force(entry: ModelTerm, record: Record) -> Floats:
     return predict_response(alone, record, response="force", steps_per_sample=4, initial=(0.0,) * len(alone.states))
 
 
-def _decay(rng: np.random.Generator) -> Bench:
-    """A structure let go, from a place that nothing else knows; no force."""
+def decay(
+    rng: np.random.Generator, reach: tuple[float, float] = (-6.0, -2.0), periods: tuple[float, float] = (40.0, 80.0)
+) -> Bench:
+    """A structure let go, from a place that nothing else knows, its logarithm drawn within ``reach``; no force."""
     model, frequency, dt = _oscillator(rng, (0.003, 0.03))
     model = _per_unit_mass(model)
-    samples = int(rng.uniform(40.0, 80.0) / (frequency * dt))
-    height = float(np.exp(rng.uniform(-6.0, -2.0)))
+    samples = int(rng.uniform(*periods) / (frequency * dt))
+    height = float(np.exp(rng.uniform(*reach)))
     start, force = (height, float(rng.uniform(-0.3, 0.3)) * height * 2.0 * np.pi * frequency), np.zeros(samples)
 
     def respond(truth: Model) -> Record:
-        record = _run(truth, force, dt, start, ["displacement"])
+        record = response_to(truth, force, dt, start, ["displacement"])
         u = record["displacement"]
         # A decay whose second half stands still tells of nothing but friction.
         expect(float(np.std(u[len(u) // 2 :])) > 0.02 * float(np.std(u)), "the motion has stopped")
         return record
 
-    return Bench(model, _run(model, force, dt, start), respond)
+    return Bench(model, response_to(model, force, dt, start), respond)
 
 
 def _blows(rng: np.random.Generator) -> Bench:
@@ -136,7 +138,7 @@ def _blows(rng: np.random.Generator) -> Bench:
         inside = (time >= begin) & (time < begin + width)
         force[inside] += float(rng.uniform(0.5, 1.5)) * np.sin(np.pi * (time[inside] - begin) / width)
         begin += float(rng.uniform(8.0, 20.0)) / frequency
-    return Bench(model, _run(model, force, dt), lambda truth: _calm(truth, force, dt))
+    return Bench(model, response_to(model, force, dt), lambda truth: _calm(truth, force, dt))
 
 
 def _base(rng: np.random.Generator) -> Bench:
@@ -150,14 +152,17 @@ def _base(rng: np.random.Generator) -> Bench:
         shown = {"base_acceleration": base, "force": np.zeros(len(base)), "displacement": relative}
         return Record(dt, shown, {**SI_UNITS, "base_acceleration": "m/s^2"})
 
-    return Bench(model, _run(model, -base, dt), respond)
+    return Bench(model, response_to(model, -base, dt), respond)
 
 
 def _calm(truth: Model, force: Floats, dt: float) -> Record:
     """Force and displacement of a system that does not magnify every disturbance."""
-    calm = effects.forgets(lambda f: _run(truth, f, dt, motions=["displacement"])["displacement"], force, slight=True)
-    expect(calm, "the motion is chaotic")
-    return _run(truth, force, dt, motions=["displacement"])
+
+    def respond(force: Floats) -> Record:
+        return response_to(truth, force, dt, motions=["displacement"])
+
+    expect(effects.forgets(lambda f: respond(f)["displacement"], force, slight=True), "the motion is chaotic")
+    return respond(force)
 
 
 def _component(rng: np.random.Generator) -> Bench:
@@ -196,11 +201,11 @@ def _axis(rng: np.random.Generator) -> Bench:
         return held.with_term(free(get("linear_stiffness")).with_values({"k": stiff}))
 
     def respond(truth: Model) -> Record:
-        record = _run(closed(truth), drive, dt)
+        record = response_to(closed(truth), drive, dt)
         force = drive - stiff * record["displacement"] - damped * record["velocity"]
         return Record(dt, {"force": force, "displacement": record["displacement"]}, dict(SI_UNITS))
 
-    return Bench(model, _run(closed(model), drive, dt), respond)
+    return Bench(model, response_to(closed(model), drive, dt), respond)
 
 
 def _moves(rng: np.random.Generator, samples: int, dt: float) -> Floats:
@@ -225,7 +230,7 @@ def _band(rng: np.random.Generator, samples: int, highest: float) -> Floats:
 
 
 TESTS: Mapping[str, Callable[[np.random.Generator], Bench]] = MappingProxyType(
-    {"free_decay": _decay, "blows": _blows, "base": _base, "component": _component, "axis": _axis}
+    {"free_decay": decay, "blows": _blows, "base": _base, "component": _component, "axis": _axis}
 )
 _ONE = tuple(n for n in HIDDEN if n not in TIMED and len(get(n).components) == 1)
 POSSIBLE: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -18,7 +18,7 @@ from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, STRUCTURES, TRIALS, Row, rows_of
+from study.trials.kept import BY_TEST, LIKE_RIGS, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
@@ -198,6 +198,11 @@ def _number(column: str) -> Score:
     return lambda row: float(row[column])
 
 
+def _effects(*counts: int) -> Member:
+    """Of trials like real rigs that could be made: so many effects hidden."""
+    return lambda row: row["hidden"] != "" and (row["hidden"] != NONE) * (row["hidden"].count("+") + 1) in counts
+
+
 def _both(row: Row) -> float:
     return _is("effect_first")(row) * _is("place_first")(row)
 
@@ -253,12 +258,31 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             Reach("95 % intervals of the true model that hold its values", _asks("true_keys"), _number("true_inside"),
                   "held", asked="true_keys"),
         ),
+        LIKE_RIGS: (
+            Reach("the right set, one effect", _effects(1), _is("right")),
+            Reach("the right set, two effects", _effects(2), _is("right"), "two"),
+            Reach("the right set, three effects", _effects(3), _is("right"), "three"),
+            Reach("the right set, four effects", _effects(4), _is("right")),
+            Reach("named effects that are truly there", lambda r: r["named_count"] > 0, _number("there"), "there",
+                  asked="named_count"),
+            Reach("nothing named where nothing is missing", _effects(0), lambda r: r["named"] == "", "nothing"),
+            Reach("the true set in the list of those that the record cannot tell apart", _effects(1, 2, 3, 4),
+                  _is("holds"), "holds"),
+            Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
+        ),
     }
 )  # fmt: skip
-GROUPS: Mapping[str, str] = MappingProxyType({TRIALS: "faults", BY_TEST: "test", STRUCTURES: ""})  # columns of a page
-WANTED_OF_STRUCTURES: Wanted = MappingProxyType(
-    {"first": (0.9,), "first_in_noise": (0.8,), "tied": (0.95,), "nothing": (0.95,), "error": (0.9,), "held": (0.95,)}
-)
+# Columns of a page.
+GROUPS: Mapping[str, str] = MappingProxyType({TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: ""})
+WANTED: Mapping[str, Wanted] = MappingProxyType(
+    {
+        STRUCTURES: {
+            "first": (0.9,), "first_in_noise": (0.8,), "tied": (0.95,), "nothing": (0.95,), "error": (0.9,),
+            "held": (0.95,),
+        },
+        LIKE_RIGS: {"two": (0.85,), "three": (0.75,), "there": (0.95,), "nothing": (0.98,), "holds": (0.95,)},
+    }
+)  # fmt: skip
 
 
 def target_summary(table: pd.DataFrame, name: str, wanted: Wanted | None = None) -> pd.DataFrame:
@@ -269,7 +293,7 @@ def target_summary(table: pd.DataFrame, name: str, wanted: Wanted | None = None)
     ``groups_of``; of the rate ``fault`` that with a fault alone.
     """
     rows, column = rows_of(table), GROUPS[name]
-    wanted = (WANTED_OF_STRUCTURES if name == STRUCTURES else {}) if wanted is None else wanted
+    wanted = WANTED.get(name, {}) if wanted is None else wanted
     found: list[Row] = []
     for place, group in enumerate(groups_of(table, name)):
         own = [row for row in rows if not column or row[column] == group]
@@ -287,7 +311,7 @@ def target_summary(table: pd.DataFrame, name: str, wanted: Wanted | None = None)
 
 def groups_of(table: pd.DataFrame, name: str) -> tuple[str, ...]:
     """What the trials of a table are grouped by."""
-    if name == STRUCTURES:
+    if not GROUPS[name]:
         return ("",)
     return (WITHOUT, WITH) if name == TRIALS else tuple(test for test in TESTS if test in set(table[GROUPS[name]]))
 

@@ -2,7 +2,7 @@
 
 Those that are driven are of five kinds: one effect hidden, none, a pair (diagnose, add what comes first, diagnose
 again), one effect hidden and taken out of the library (``removed``), and one effect that the model has already
-(``completed``). Other tests, and structures, hide one effect or none.
+(``completed``). Other tests, and structures, hide one effect or none; trials like real rigs up to four.
 """
 
 import math
@@ -17,16 +17,19 @@ import numpy as np
 from study.diagnose.adding import added
 from study.diagnose.confirmed_faults import diagnosed
 from study.diagnose.verdict import NOTHING, diagnose
+from study.equations.terms import LIBRARY
 from study.faults.fault import FAULTS, fault_fields
 from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import findings
 from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial, make_trial
+from study.trials.effect_sets import named_sets, steady_ones, truth_of
 from study.trials.effects import HIDDEN
 from study.trials.findings import compared, intervals, tie_set
-from study.trials.kept import BY_TEST, KEPT_TABLES, STRUCTURES, TRIALS, Row
+from study.trials.kept import BY_TEST, KEPT_TABLES, LIKE_RIGS, STRUCTURES, TRIALS, Row
 from study.trials.kinds import TESTS
+from study.trials.rigs import RIG_KINDS
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
@@ -50,7 +53,7 @@ def orders(table: str, settings: TrialSettings) -> list[Order]:
     """Every trial of a kept table; ``settings`` are those of ``trials``."""
     if table == TRIALS:
         return driven_orders(settings)
-    return structure_orders() if table == STRUCTURES else orders_of_tests()
+    return {STRUCTURES: structure_orders, BY_TEST: orders_of_tests, LIKE_RIGS: rig_orders}[table]()
 
 
 def driven_orders(settings: TrialSettings) -> list[Order]:
@@ -109,6 +112,12 @@ def structure_orders(count: int = 120, first: int = 20_000) -> list[Order]:
     return every
 
 
+def rig_orders(first: int = 780_001, each: int = 26) -> list[Order]:
+    """So many trials like real rigs of each kind of test, twice as many of structures."""
+    kinds = (*RIG_KINDS, list(RIG_KINDS)[-1])
+    return [Order("", first + i, None, None, None, test=kinds[i % len(kinds)]) for i in range(each * len(kinds))]
+
+
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
     judged, nothing = JUDGES.get(order.test, _judged_test), "" if order.test == DRIVEN_MASS else NONE
@@ -138,7 +147,7 @@ def run_trial(order: Order) -> Row:
 
 def table_of(order: Order) -> str:
     """The kept table that a trial belongs to."""
-    return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES}.get(order.test, BY_TEST)
+    return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES, **dict.fromkeys(RIG_KINDS, LIKE_RIGS)}.get(order.test, BY_TEST)
 
 
 def _judged_driven(order: Order, trial: Trial) -> Row:
@@ -217,6 +226,30 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
     return row | {"error_true": true.prediction.error, "true_inside": held["held"], "true_keys": held["asked"]}
 
 
+def _judged_rig(_: Order, trial: Trial) -> Row:
+    """Which set is named, whether it and each of its effects are the true ones, and whether the list has these."""
+    before, faults = compared(trial, trial.believed)
+    unknown = str(trial.about.get("remainder", ""))
+    diagnosis = diagnose(before, without=(unknown,) if unknown in LIBRARY else ())
+    sets, found = named_sets(diagnosis), [fault.fault for fault in confirmed(faults, diagnosis)]
+    row: Row = {
+        "verdict": diagnosis.verdict, "faults_found": "+".join(found), "named": "+".join(sets[0].names) if sets else "",
+        "sets": " ".join("+".join(s.names) for s in sets), "named_count": len(sets[0].names) if sets else 0,
+        "error_before": before.prediction.error, "error_after": sets[0].error if sets else "",
+        "noise_floor": before.prediction.floor,
+    }  # fmt: skip
+    truth = truth_of(trial)
+    elsewhere = steady_ones(trial) if "offset" in found else ()
+    hits = [truth.found(s.entries, elsewhere) for s in sets]
+    whole = [(len(s.names), 0) == hit for s, hit in zip(sets, hits, strict=True)]
+    if not trial.hidden:
+        whole = [diagnosis.verdict == NOTHING]
+    return row | {
+        "there": hits[0][0] if hits else 0, "right": int(any(whole[:1])), "holds": int(any(whole)),
+        "error_true": truth.error,
+    }  # fmt: skip
+
+
 JUDGES: Mapping[str, Callable[[Order, Trial], Row]] = MappingProxyType(
-    {DRIVEN_MASS: _judged_driven, STRUCTURE: _judged_structure}
+    {DRIVEN_MASS: _judged_driven, STRUCTURE: _judged_structure, **dict.fromkeys(RIG_KINDS, _judged_rig)}
 )

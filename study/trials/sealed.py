@@ -79,7 +79,11 @@ def unseal(path: Path) -> Answer:
 def answer_in_words(answer: Answer) -> str:
     """An answer for people."""
     hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer.hidden, answer.shares, strict=True)]
-    what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"
+    what = (
+        f"hidden, with the share of the force, or of a rig the error without it: {', '.join(hidden)}"
+        if hidden
+        else "nothing is hidden"
+    )
     noise = f"noise: {100.0 * answer.noise:g} % of the mean square of the response"
     fault, said = answer.fault, "none"
     if isinstance(fault, Imposed):

@@ -1,0 +1,95 @@
+"""Of trials with several effects: the sets that a diagnosis names, and which of their effects are truly there.
+
+Along one motion some effects are one: an effect counts as a true one if, along this very motion, what it adds to the
+response is what that adds, beside all that the believed model's own coefficients can change.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from study.compare.prediction import predict
+from study.diagnose.verdict import MISSING, Diagnosis
+from study.equations.model import Model, ModelTerm
+from study.equations.terms import get
+from study.identify.time_domain.part_fit import fit_part, with_states
+from study.identify.time_domain.shape_search import Baseline, baseline, explained_by, sensitivity
+from study.records.record_layout import Layout
+from study.support.arrays import Floats
+from study.support.least_squares import length_or_one
+from study.trials.draw import Trial
+from study.trials.findings import tie_set
+from study.way_in.compare_records import made_ready
+
+
+@dataclass(frozen=True)
+class NamedSet:
+    """Effects that are said to be missing together."""
+
+    names: tuple[str, ...]  # with their places
+    model: Model  # with these, as fitted
+    error: float  # of the response that this model leaves in what it was not fitted to
+
+    @property
+    def entries(self) -> tuple[ModelTerm, ...]:
+        return tuple(entry for entry in self.model.terms if entry.name in self.names)
+
+
+def named_sets(diagnosis: Diagnosis) -> tuple[NamedSet, ...]:
+    """The sets that the record cannot tell from the best, the answer first; none where nothing is named."""
+    rows = {row.name: row for row in diagnosis.candidates}
+    if diagnosis.verdict == MISSING and diagnosis.pair:
+        one, other = (rows[name] for name in diagnosis.pair)
+        entry = next(e for e in other.fit.model.terms if e.name == other.name)
+        return (NamedSet(diagnosis.pair, one.fit.model.with_term(entry), one.prediction.error),)
+    return tuple(NamedSet((name,), rows[name].fit.model, rows[name].prediction.error) for name in tie_set(diagnosis))
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The true model, fitted from its true values, and what its effects add along its motion."""
+
+    base: Baseline  # beside the coefficients that the believed model has
+    added: Mapping[str, Floats]  # to the response by each hidden effect, beside these, shape (n s,)
+    error: float  # that it leaves in what it was not fitted to
+
+    def found(self, named: Sequence[ModelTerm], found_elsewhere: Collection[str] = ()) -> tuple[int, int]:
+        """How many of some named effects are each a hidden one of its own, and how many hidden ones they leave.
+
+        ``found_elsewhere`` are hidden ones that a fault of the measurement stands for.
+        """
+        hidden = [name for name in self.added if name not in found_elsewhere]
+        pairs = [self.same(entry, name) for entry in named for name in hidden]
+        same = np.array(pairs, dtype=bool).reshape(len(named), len(hidden))
+        count = int(np.sum(same[linear_sum_assignment(same, maximize=True)]))
+        return count, len(hidden) - count
+
+    def same(self, entry: ModelTerm, name: str, alike: float = 0.98) -> bool:
+        """Whether a named effect is a hidden one, or correlates with it so much along this motion."""
+        if entry.name in self.added:
+            return entry.name == name
+        columns = sensitivity(entry, tuple(float(p or 0.0) for p in entry.parameters), self.base)
+        return columns is not None and explained_by(columns, self.added[name], ()).share > alike**2
+
+
+def truth_of(trial: Trial) -> Truth:
+    """The true model along its motion; a ``StudyError`` if it cannot be fitted."""
+    model, prepared = made_ready([trial.record], trial.completed, Layout())
+    start = {key: value for key, value in trial.truth.numbers().items() if key not in model.held_keys}
+    fit = fit_part(model, prepared, model.held_keys, start, steps=8, max_iterations=30)
+    jacobian = with_states(fit, prepared)
+    known = [i for i in range(jacobian.shape[1]) if i >= len(fit.keys) or fit.keys[i] in trial.believed.values]
+    basis = np.linalg.qr(jacobian[:, known] / length_or_one(jacobian[:, known]))[0]
+    added: dict[str, Floats] = {}
+    for entry in (e for e in fit.model.terms if e.name in trial.hidden):
+        amounts = np.array([c or 0.0 for c in entry.coefficients])
+        column = jacobian[:, [fit.keys.index(key) for key in entry.symbols]] @ amounts
+        added[entry.name] = column - basis @ (basis.T @ column)
+    return Truth(replace(baseline(fit, prepared), basis=basis), added, predict(fit, prepared).error)
+
+
+def steady_ones(trial: Trial) -> tuple[str, ...]:
+    """Hidden effects that an offset of a sensor may be instead."""
+    return tuple(entry.name for entry in trial.effects if get(entry.term.name).steady)
