@@ -89,7 +89,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 
 def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
-    effects = enumerated([effect_in_words(e.entry) for e in answer.effects])
+    effects = enumerated([_with_alike(e.entry, diagnosis) for e in answer.effects])
     known = "are missing" if diagnosis.verdict != PARTLY else "are missing, and something beside them that has no name"
     said = [
         f"{effects[0].upper()}{effects[1:]} {known}.",
@@ -98,7 +98,7 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
         f"Their coefficients are {enumerated([_amount_of(e, answer) for e in answer.effects])}.",
     ]
     if diagnosis.left > 0.0:
-        said.append(f"{percent(diagnosis.left)} of the response is left beside them that still depends on the motion.")
+        said.append(f"{percent(diagnosis.left)} of the response is left beside them{_depending(diagnosis)}.")
     if answer.unphysical:
         said.append(f"As fitted one of them is no physical effect: {answer.unphysical}.")
     if len(diagnosis.sets) > 1:
@@ -106,6 +106,22 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
         often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]
         said.append(f"The record cannot tell {count} such sets apart; of these {count}, {enumerated(often)}.")
     return said
+
+
+def _with_alike(entry: ModelTerm, diagnosis: Diagnosis) -> str:
+    """An effect in words, and those that may stand in its place."""
+    others = diagnosis.alike[entry.name]
+    words = effect_in_words(entry)
+    return f"{words} (or {' or '.join(term_names(name) for name in others)})" if others else words
+
+
+def _depending(diagnosis: Diagnosis) -> str:
+    """On what that depends which has no name; empty where nothing stands out."""
+    found = [f for f in diagnosis.families if f.gain.explained > DEPENDENCE]
+    if not found:
+        return ", which depends on the motion, its past or time"
+    place = f" {place_in_words(found[0].place)}" if found[0].place.label else ""
+    return f", which depends on {found[0].family}{place}"
 
 
 def _amount_of(effect: FittedEffect, row: Ranked) -> str:

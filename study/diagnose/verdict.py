@@ -49,7 +49,7 @@ class Diagnosis:
     asked: int  # effects at places
     left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     sets: tuple[Ranked, ...]  # the answer, and all others that the record cannot tell from the best; empty without any
-    families: tuple[FamilyGain, ...]  # for an unknown effect: what functions of displacement, ... explain, best first
+    families: tuple[FamilyGain, ...]  # what functions of displacement, ... explain of what has no name, best first
 
     @property
     def answer(self) -> Ranked | None:
@@ -61,6 +61,16 @@ class Diagnosis:
         """In how many of the sets each effect is, the most frequent first."""
         names = [name for row in self.sets for name in row.names]
         return dict(sorted(((name, names.count(name)) for name in dict.fromkeys(names)), key=lambda item: -item[1]))
+
+    @cached_property
+    def alike(self) -> dict[str, tuple[str, ...]]:
+        """For each effect of the answer those that may stand in its place for all that this record tells."""
+        own = set() if self.answer is None else set(self.answer.names)
+        others = [set(row.names) for row in self.sets[1:] if len(row.names) == len(own)]
+        return {
+            name: tuple(sorted(next(iter(names - own)) for names in others if own - names == {name}))
+            for name in (() if self.answer is None else self.answer.names)
+        }
 
     @cached_property
     def modes_after(self) -> Modes | None:
@@ -90,8 +100,11 @@ def diagnose(
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
     decision = _decide(rows, tried, base, comparison, asked)
-    unexplained = decision.verdict in (UNKNOWN, PARTLY)
-    families = dependence.families(dependence.unexplained(base)) if unexplained else []
+    families: list[FamilyGain] = []
+    if decision.verdict == UNKNOWN:
+        families = dependence.families(dependence.unexplained(base))
+    elif decision.verdict == PARTLY or (decision.verdict == SEVERAL and decision.left > GOOD):
+        families = dependence.families(dependence.left_by(decision.sets[0].fit, comparison.prepared))
     return Diagnosis(
         decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
     )
