@@ -95,7 +95,7 @@ def diagnose(
     terms of the library to leave out; ``progress`` is called after each candidate that was fitted.
     """
     base = search_base(comparison)
-    entries = candidate_entries(comparison.fit.model, extra, without)
+    entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
     tried = candidates.try_all(entries, base, progress)
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)

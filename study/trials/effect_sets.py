@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from study.compare.prediction import predict
-from study.diagnose.verdict import MISSING, Diagnosis
-from study.equations.model import Model, ModelTerm
+from study.diagnose.candidates import FittedCandidate
+from study.equations.model import ModelTerm
 from study.equations.terms import get
 from study.identify.time_domain.part_fit import fit_part, with_states
 from study.identify.time_domain.shape_search import Baseline, baseline, explained_by, sensitivity
@@ -20,31 +20,12 @@ from study.records.record_layout import Layout
 from study.support.arrays import Floats
 from study.support.least_squares import length_or_one
 from study.trials.draw import Trial
-from study.trials.findings import tie_set
 from study.way_in.compare_records import made_ready
 
 
-@dataclass(frozen=True)
-class NamedSet:
-    """Effects that are said to be missing together."""
-
-    names: tuple[str, ...]  # with their places
-    model: Model  # with these, as fitted
-    error: float  # of the response that this model leaves in what it was not fitted to
-
-    @property
-    def entries(self) -> tuple[ModelTerm, ...]:
-        return tuple(entry for entry in self.model.terms if entry.name in self.names)
-
-
-def named_sets(diagnosis: Diagnosis) -> tuple[NamedSet, ...]:
-    """The sets that the record cannot tell from the best, the answer first; none where nothing is named."""
-    rows = {row.name: row for row in diagnosis.candidates}
-    if diagnosis.verdict == MISSING and diagnosis.pair:
-        one, other = (rows[name] for name in diagnosis.pair)
-        entry = next(e for e in other.fit.model.terms if e.name == other.name)
-        return (NamedSet(diagnosis.pair, one.fit.model.with_term(entry), one.prediction.error),)
-    return tuple(NamedSet((name,), rows[name].fit.model, rows[name].prediction.error) for name in tie_set(diagnosis))
+def as_fitted(candidate: FittedCandidate) -> tuple[ModelTerm, ...]:
+    """The effects of a set with their values."""
+    return tuple(entry for entry in candidate.fit.model.terms if entry.name in candidate.names)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import findings
 from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial, make_trial
-from study.trials.effect_sets import named_sets, steady_ones, truth_of
+from study.trials.effect_sets import as_fitted, steady_ones, truth_of
 from study.trials.effects import HIDDEN
 from study.trials.findings import compared, intervals, tie_set
 from study.trials.kept import BY_TEST, KEPT_TABLES, LIKE_RIGS, STRUCTURES, TRIALS, Row
@@ -228,24 +228,24 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
 
 def _judged_rig(_: Order, trial: Trial) -> Row:
     """Which set is named, whether it and each of its effects are the true ones, and whether the list has these."""
-    before, faults = compared(trial, trial.believed)
     unknown = str(trial.about.get("remainder", ""))
-    diagnosis = diagnose(before, without=(unknown,) if unknown in LIBRARY else ())
-    sets, found = named_sets(diagnosis), [fault.fault for fault in confirmed(faults, diagnosis)]
+    found = diagnosed(compared(trial, trial.believed), without=(unknown,) if unknown in LIBRARY else ())
+    diagnosis, faults = found.diagnosis, [fault.fault for fault in found.faults]
+    before, answer = diagnosis.comparison.prediction, diagnosis.answer
+    named = () if answer is None else answer.names
     row: Row = {
-        "verdict": diagnosis.verdict, "faults_found": "+".join(found), "named": "+".join(sets[0].names) if sets else "",
-        "sets": " ".join("+".join(s.names) for s in sets), "named_count": len(sets[0].names) if sets else 0,
-        "error_before": before.prediction.error, "error_after": sets[0].error if sets else "",
-        "noise_floor": before.prediction.floor,
+        "verdict": diagnosis.verdict, "faults_found": "+".join(faults), "named": "+".join(named),
+        "sets": " ".join("+".join(s.names) for s in diagnosis.sets), "named_count": len(named),
+        "error_before": before.error, "error_after": "" if answer is None else answer.prediction.error,
+        "noise_floor": before.floor,
     }  # fmt: skip
     truth = truth_of(trial)
-    elsewhere = steady_ones(trial) if "offset" in found else ()
-    hits = [truth.found(s.entries, elsewhere) for s in sets]
-    whole = [(len(s.names), 0) == hit for s, hit in zip(sets, hits, strict=True)]
-    if not trial.hidden:
-        whole = [diagnosis.verdict == NOTHING]
+    elsewhere = steady_ones(trial) if "offset" in faults else ()
+    hits = [truth.found(as_fitted(s), elsewhere) for s in diagnosis.sets]
+    whole = [(len(s.names), 0) == hit for s, hit in zip(diagnosis.sets, hits, strict=True)]
+    right = diagnosis.verdict == NOTHING if not trial.hidden else answer is not None and whole[0]
     return row | {
-        "there": hits[0][0] if hits else 0, "right": int(any(whole[:1])), "holds": int(any(whole)),
+        "there": 0 if answer is None else hits[0][0], "right": int(right), "holds": int(right or any(whole)),
         "error_true": truth.error,
     }  # fmt: skip
 
