@@ -218,7 +218,8 @@ def _from_the_equations(entry: ModelTerm, base: Baseline, points: Sequence[Start
 
 def grown_states(fit: FreeRunFit, model: Model) -> Floats:
     """The states with which the stretches of a fit begin, for a model with other terms; those of new terms are zero."""
-    motions, given = 2 * len(model.coordinates), np.atleast_2d(fit.initial)
+    given = np.atleast_2d(fit.initial)
+    motions = given.shape[1] - len(fit.model.states)  # none of a coordinate whose motion is prescribed
     states = np.zeros((len(given), motions + len(model.states)))
     own = {t.name: motions + i for i, t in enumerate(fit.model.states)}
     states[:, :motions] = given[:, :motions]
