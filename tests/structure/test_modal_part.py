@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 from study.cli import main
 from study.compare import history
-from study.compare.modal_comparison import compare_modal, modal_document, modal_says
+from study.compare.comparison import compare, modal_document, modal_says
 from study.equations.free_run import prepare
 from study.equations.linear_part import matrices, modes_of, transfer
 from study.equations.modal_part import ModalPart, rates_of
@@ -121,7 +121,7 @@ def at_sensors(beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10
 
 @pytest.fixture(scope="module")
 def comparison(beam):
-    return compare_modal(modal(), prepare_record(at_sensors(beam)))
+    return compare(modal(), prepare_record(at_sensors(beam)))
 
 
 def test_the_cubic_spring_and_the_free_run_of_the_beam(comparison):
@@ -154,7 +154,7 @@ def test_coefficients_line_by_line_are_real_and_flat(comparison):
 
 def test_a_term_at_the_wrong_place_leaves_the_error(beam):
     wrong = modal(MODAL.replace("[ground, p10]", "[p4, p7]"))
-    found = compare_modal(wrong, prepare_record(at_sensors(beam, samples=4000)))
+    found = compare(wrong, prepare_record(at_sensors(beam, samples=4000)))
     assert found.prediction.error > 1.1 * np.sqrt(0.01)
 
 
@@ -189,7 +189,7 @@ def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, re
     noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
     model = modal("coordinates: [x]\nforces: {shaker: x}\nlinear: modal\nterms: [{term: cubic_stiffness, at: x}]")
     own = record.with_motions({Sensor("x", motion): noisy})
-    fitted = compare_modal(model, prepare_record(own)).fit.model
+    fitted = compare(model, prepare_record(own)).fit.model
     assert fitted.modal.count == 1
     values = fitted.numbers()
     mass = values["phi[x,1]"] ** -2
