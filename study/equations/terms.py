@@ -331,13 +331,13 @@ def one_sided(term: Term) -> bool:
 
 def linear(term: Term) -> bool:
     """Whether its forces at two motions add up to that at their sum, at any time: no mode is needed beside it."""
-    parameters = {p.name: 0.3 for p in term.parameters}
+    parameters = {p.name: 0.3 + 0.1 * i for i, p in enumerate(term.parameters)}
     for text in [c.shape for c in term.components] + ([term.state] if term.state else []):
         if not {"u", "v", "z", *parameters}.issuperset(formulas.names(text)):
             return False
         graph = Graph()
         program = graph.program([formulas.add_formula(graph, text, {n: graph.input(n) for n in formulas.names(text)})])
-        one, other = ({"u": u, "v": v, "z": z} for u, v, z in ((0.7, -0.4, 0.2), (-1.9, 1.1, -0.5)))
+        one, other = ({"u": u, "v": v, "z": z} for u, v, z in ((0.7, -0.4, 0.2), (-1.9, 1.1, 0.5)))
         both = {name: one[name] + other[name] for name in one}
         parts = [_value(program, {**parameters, **motion}) for motion in (one, other, both)]
         if abs(parts[0] + parts[1] - parts[2]) > 1e-9:

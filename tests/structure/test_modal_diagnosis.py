@@ -16,7 +16,7 @@ from study.equations.model_file import parse_model, read_model
 from study.equations.possible_effects import candidate_entries
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
-from study.identify.time_domain.modal_fit import modal_fit
+from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
 from study.records.record import Sensor, write_csv
@@ -115,7 +115,7 @@ def test_a_shape_parameter_that_the_model_gives_is_held():
     whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
     record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 8))
     model = parse_model(f"{place}linear: modal\nterms: [{{term: hysteresis, at: x, beta: 200.0}}]", Path("one.yaml"))
-    fitted = modal_fit(model, prepare_record(record))
+    fitted = fit_model(model, prepare_record(record))
     assert fitted.model.numbers()["hysteresis[x].beta"] == 200.0
     assert "hysteresis[x].beta" in fitted.held
     assert "hysteresis[x].gamma" in fitted.keys
