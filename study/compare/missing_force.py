@@ -184,12 +184,12 @@ class BesideModes(Unbalanced):
     def at(self, place: Place) -> MissingForce:
         """The force that is missing at a place, as all sensors together have it."""
         e, n = np.array(place.direction(self.model.coordinates)), len(self.lacking_motion)
-        sides = np.concatenate([self.lacking_motion[:, :, None], self.slopes], axis=2).reshape(n, -1)
-        longer, edge = _continued(sides, self.frequency, self.dt)
-        size = next_fast_len(len(longer), real=True)
-        lines = np.asarray(rfft(longer, size, axis=0)).reshape(-1, len(self.size), 1 + self.slopes.shape[2])
-        gate = np.any(self.gates, axis=1)
-        sure = np.interp(np.asarray(rfftfreq(size, self.dt)), self.frequency, gate.astype(np.float64))
+        both = np.concatenate([self.lacking_motion[:, :, None], self.slopes], axis=2)
+        longer, edge = _continued(both, self.frequency, self.dt)
+        size, gate = next_fast_len(len(longer), real=True), np.any(self.gates, axis=1)
+        lines = np.asarray(rfft(longer, size, axis=0), dtype=np.complex128)
+        at = np.asarray(rfftfreq(size, self.dt), dtype=np.float64)
+        sure = np.asarray(np.interp(at, self.frequency, gate.astype(np.float64)), dtype=np.float64)
         found = _history(np.einsum("f,fs,fsp->fp", sure, self._inverse(e, size), lines), size)[edge : edge + n]
         largest = float(np.max(self.noise))
         noise = self.noise / largest if largest > 0.0 else np.ones(len(self.size))

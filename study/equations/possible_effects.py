@@ -6,7 +6,7 @@ from study.equations.linear_part import connections
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
 from study.equations.term import Term
-from study.equations.terms import effects_but, external, linear, one_sided
+from study.equations.terms import effects_but, external, is_linear, one_sided
 
 
 def candidate_entries(
@@ -22,7 +22,7 @@ def candidate_entries(
     found: list[ModelTerm] = []
     for term in effects_but(without, extra):
         outside = external(term)
-        if model.modal and (outside or linear(term)):
+        if model.modal and (outside or is_linear(term)):
             continue
         for place in [Place("at", (c,)) for c in model.coordinates] if outside else connections(model):
             straight = any(end not in turning for end in place.moving)
