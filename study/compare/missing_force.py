@@ -279,7 +279,7 @@ def _beside_modes(model: Model, keys: Sequence[str], prediction: Prediction, gat
     if run is not None and keys:
         with suppress(DivergenceError):
             slopes = run.derivatives(run.fit)[:, : len(keys)]
-    slopes = slopes.reshape(n, -1, len(keys)) / np.array(prepared.outputs.weights)[:, None]
+    slopes = slopes.reshape(*beyond.shape, len(keys)) / np.array(prepared.outputs.weights)[:, None]
     width = float(frequency[1])
     noise = [float(np.sum(x.density[gate]) * width) for x, gate in zip(noises, gates.T, strict=True)]
     return BesideModes(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import study as st
 from study.cli import main
 from study.compare.comparison import compare
 from study.diagnose.diagnosis_files import diagnosis_in_words
@@ -119,3 +120,13 @@ def test_a_shape_parameter_that_the_model_gives_is_held():
     assert fitted.model.numbers()["hysteresis[x].beta"] == 200.0
     assert "hysteresis[x].beta" in fitted.held
     assert "hysteresis[x].gamma" in fitted.keys
+
+
+@pytest.mark.long
+def test_a_notebook_takes_it_as_any_model(record):
+    bare = st.Model(name="bare", coordinates=["p4", "p10"], forces={"shaker": "p4"}, modal=True)
+    fit = bare.fit(st.Record.of(record))
+    grown = fit.add("cubic_stiffness", between=("ground", "p10"))
+    assert grown.error < 0.3 * fit.error
+    assert grown.model.values["k3[ground-p10]"] == pytest.approx(1e5, rel=0.03)
+    assert grown.drop("cubic_stiffness").error == pytest.approx(fit.error, rel=1e-3)

@@ -11,16 +11,21 @@ from study.cli import main
 from study.compare import history
 from study.compare.comparison import compare
 from study.compare.comparison_report import comparison_document
+from study.compare.missing_force import MissingForce, unbalanced
+from study.compare.prediction import predict
 from study.equations.free_run import prepare
 from study.equations.linear_part import matrices, modes_of, transfer
 from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
+from study.explore import session as sessions
+from study.explore.placed_view import placed_view
 from study.identify.frequency_domain.subspace import observability
+from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
-from study.records.record import Record, Sensor, record_of, write_csv
+from study.records.record import MOTIONS, Record, Sensor, record_of, write_csv
 from study.records.record_layout import Layout
 from study.support.errors import StudyError
 from study.way_in.compare_records import made_ready
@@ -274,3 +279,35 @@ def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys)
     before, after = history.read_history(model)
     assert after["dropped"] == "cubic_stiffness[ground-p10]"
     assert after["error"]["response"] > 2.0 * before["error"]["response"]
+
+
+def test_the_force_that_is_missing_between_two_coordinates_is_told_through_the_modes(lumped_and_by_modes):
+    """A stop that the model lacks, beside the exact modes: the same as the equations of motion tell."""
+    lumped, own = lumped_and_by_modes
+    drive = {"shaker": force(Excitation(level=100.0, cutoff=8.0), 4000, 0.02, 5)}
+    whole = simulate(lumped, drive, 0.02, Integrator("rk4", 8))
+    prepared = prepare_record(whole.with_motions({s: x for s, x in whole.motions.items() if s.motion == MOTIONS[0]}))
+    (stop,) = own.terms
+    found: list[MissingForce] = []
+    for model in (lumped, own):
+        fit = fit_part(model.without_term(stop.name), prepared, tuple(model.without_term(stop.name).values), steps=8)
+        missing = unbalanced(fit.model, fit.keys, predict(fit, prepared))
+        found.append(missing.at(next(p for p in missing.shown if p.path == stop.place.path)))
+    assert missing.equations == ()
+    k, gap = (stop.values[key] for key in stop.keys)
+    judged = slice(*prepared.plan.judge)
+    ends = {end: whole[Sensor(end, MOTIONS[0])][judged] for end in stop.place.ends}
+    true = k * np.maximum(ends[stop.place.ends[1]] - ends[stop.place.ends[0]] - gap, 0.0)
+    for lacking in found:
+        seen, wanted = (lacking.weighted(x)[lacking.inner] for x in (lacking.force, true))
+        assert np.std(seen - wanted) < 0.05 * np.std(wanted)
+
+
+def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_forces(comparison):
+    shown = placed_view(sessions.begin_with(comparison).now, 0)
+    words = dict(zip(shown.columns["words"]["place"], shown.columns["words"]["html"], strict=True))
+    assert "Error of the motions" in words["figures"]
+    assert "Error of the forces" not in words["figures"]
+    assert words["modes"].count("<tr>") == 2 + len(comparison.modes.frequency)
+    assert len(shown.drawn.links) == 6, "each sensor to the ground, and each two"
+    assert len(shown.columns["all_motion"]["of"]) > 1000
