@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from study.compare.modal_comparison import compare_modal
+from study.compare.comparison import compare
 from study.equations.model_file import read_model
 from study.figures import page
 from study.records.prepared import prepare_record
@@ -30,7 +30,7 @@ def main(
         write_csv(record, beside)
     if case.measured:  # by its own modes
         assumed = measured_model(structure, case.sensors)
-        comparison = compare_modal(assumed, prepare_record(record))
+        comparison = compare(assumed, prepare_record(record))
         told = (case, structure, comparison, settings)
         responses = structure_tables.modal_responses(*told)
         made = {

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands import modal
 from study.commands.command import Command
 from study.commands.record_arguments import out_folder
 from study.commands.revision import add_revision_arguments, revise
@@ -34,10 +33,7 @@ def _run(arguments: argparse.Namespace) -> None:
         model = read_model(arguments.model)
         entry = _entry(arguments, model, term)
         text = text_with(arguments.model, entry)
-        if model.modal:
-            modal.revise_modal(arguments, model, model.with_term(entry), text, folder, added=entry.name)
-        else:
-            revise(arguments, model, text, folder, lambda before: added(before, entry), added=entry.name)
+        revise(arguments, model, text, folder, lambda before: added(before, entry), added=entry.name)
 
 
 def _entry(arguments: argparse.Namespace, model: "Model", term: "Term") -> "ModelTerm":

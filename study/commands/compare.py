@@ -3,7 +3,6 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from study.commands import modal
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_together,
@@ -47,9 +46,6 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    if model.modal:
-        modal.compare_modal_command(arguments, model)
-        return
     records = read_records(arguments, model)
     model, marked, separate = separated_records(arguments, model, records)
     tests = [marked] if separate else [[record] for record in records]

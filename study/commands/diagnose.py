@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands import modal
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_together,
@@ -58,9 +57,6 @@ def _run(arguments: argparse.Namespace) -> None:
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
-    if model.modal:
-        modal.diagnose_modal_command(arguments, model, own)
-        return
     files: dict[str, bytes] = {}
     records = read_records(arguments, model)
     for path in arguments.records:

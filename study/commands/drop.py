@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from study.commands import modal
 from study.commands.command import Command
 from study.commands.record_arguments import out_folder
 from study.commands.revision import add_revision_arguments, revise
@@ -32,10 +31,7 @@ def _run(arguments: argparse.Namespace) -> None:
             place = layout.place_of_entry(where, arguments.term, model.coordinates) if where else None
             name = term_at(model, arguments.term, place)
         text = text_without(arguments.model, name)
-        if model.modal:
-            modal.revise_modal(arguments, model, model.without_term(name), text, folder, dropped=name)
-        else:
-            revise(arguments, model, text, folder, lambda before: compared_without(before, name), dropped=name)
+        revise(arguments, model, text, folder, lambda before: compared_without(before, name), dropped=name)
 
 
 COMMAND = Command(

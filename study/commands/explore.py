@@ -3,7 +3,6 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from study.commands import modal
 from study.commands.command import Command, progress, whole_number
 from study.commands.record_arguments import (
     accounted_together,
@@ -62,7 +61,6 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
         not (arguments.each_record and model.named),
         "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a session",
     )
-    modal.refuse_modal(model, "explore")
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate

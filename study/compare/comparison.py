@@ -24,6 +24,7 @@ from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import Modes, is_positive, modes_of
 from study.equations.model import Model
 from study.equations.place import Place
+from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -101,6 +102,14 @@ class Comparison:
             return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(self.model.coordinates))),) * 2)
         return modes_of(self.fit.model, self.found.symbols, self.found.covariance)
 
+    @cached_property
+    def by_line(self) -> tuple[CoefficientSpectrum, ...]:
+        """Coefficients beside a modal linear part line by line; none of another, nor where no line can be read."""
+        try:
+            return coefficient_spectra(self.fit, self.prepared) if self.model.modal else ()
+        except StudyError:
+            return ()
+
     @property
     def natural(self) -> tuple[Value | None, Value | None]:
         """Natural frequency and damping ratio of a single mass, (4.4) and (4.5); None without what they follow from."""
@@ -122,7 +131,7 @@ class Comparison:
 
     @property
     def force_error(self) -> float:
-        """Share of the force's power that is unexplained; of that of inertia in a structure."""
+        """Share of the force's power that is unexplained; of that of inertia in a structure, nan beside modes."""
         return self.forces[0].total if self.forces else self.missing.share
 
     @property
@@ -155,8 +164,6 @@ def compare(
     cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)
-    sentence = f"{model.name!r} has 'linear: modal'; expected a model with inertia at every coordinate here"
-    expect(model.modal is None, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     expect(
         estimator == FREE_RUN or not model.named,
         f"--estimator {estimator} is for a single mass; expected {FREE_RUN} of a structure",
@@ -188,7 +195,7 @@ def _of_a_structure(fit: FreeRunFit) -> list[str]:
     """What to say of several coordinates: motions that nothing ties down, values that the record does not show."""
     if not fit.model.named:
         return []
-    loose = loose_motions(fit.model)
+    loose = 0 if fit.model.modal else loose_motions(fit.model)
     drifts = f"nothing ties the structure down in {loose} of its motions: it may drift away as a whole"
     unclear = f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}"
     return [drifts if loose else "", unclear if fit.undecided else ""]

@@ -21,6 +21,7 @@ from study.compare.force_map import curve, surface
 from study.equations import model_file
 from study.equations.linear_part import Modes, modes_table
 from study.equations.place import HERE
+from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum
 from study.support.numbers import percent
 
 Row = dict[str, Any]
@@ -60,6 +61,7 @@ def _mean(values: Sequence[float], key: str) -> float:
 def _of_record(comparison: Comparison) -> Row:
     prediction, model, document = comparison.prediction, comparison.model, Row()
     how = {"coordinates": list(model.coordinates)} if model.named else {"equation": model.equation()}
+    how |= {"linear": "modal"} if model.modal else {}
     document |= {
         "record": comparison.record.name,
         "model": {"name": model.name, **how, "terms": [model_file.format_entry(t) for t in model.terms]},
@@ -67,6 +69,7 @@ def _of_record(comparison: Comparison) -> Row:
         "noise_floor": {"response": prediction.floor},
         "rms": {}, "above_noise": {"response": prediction.above_noise},
         "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+        **({"by_frequency": [_line_row(s) for s in comparison.by_line]} if model.modal else {}),
         "fit": {
             "samples": list(comparison.spans[0]), "judged": list(comparison.spans[1]),
             "every_sample": comparison.prepared.every, "response": comparison.plan.response,
@@ -163,7 +166,7 @@ def _between_equations(comparison: Comparison) -> Row:
     return {
         "coordinates": [
             {"coordinate": c, "residual_force": float(r), "force": float(f)}
-            for c, r, f in zip(missing.coordinates, missing.rms, missing.inertia, strict=True)
+            for c, r, f in zip(missing.equations, missing.rms, missing.inertia, strict=True)
         ],
         "places": [
             {**place.plain(), "share": share, "explained": explained.get(place.path, 0.0)}
@@ -184,6 +187,17 @@ def coefficient_row(coefficient: Coefficient) -> Row:
         **({} if coefficient.place == HERE else coefficient.place.plain()), "value": coefficient.value,
         "interval": None if coefficient.interval is None else list(coefficient.interval),
         "standard_error": coefficient.error, "unit": coefficient.unit, "held": coefficient.held,
+    }  # fmt: skip
+
+
+def _line_row(spectrum: CoefficientSpectrum) -> Row:
+    """A coefficient line by line as a plain row."""
+    of_all = {"mean": spectrum.mean, "imaginary": spectrum.imaginary, "trend": spectrum.trend}
+    return {
+        "key": spectrum.key, **spectrum.place.plain(),
+        **{name: {"value": value, "standard_error": error} for name, (value, error) in of_all.items()},
+        "frequency": spectrum.frequency.tolist(), "real": spectrum.values.real.tolist(),
+        "imaginary_part": spectrum.values.imag.tolist(), "standard_error": spectrum.error.tolist(),
     }  # fmt: skip
 
 
@@ -363,13 +377,21 @@ def _record_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[lis
 
 
 def _sensor_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
-    heads, rows = ["sensor", "response error", "in units", "noise floor", "force left there"], list[list[str]]()
+    heads, rows = ["sensor", "response error", "in units", "noise floor"], list[list[str]]()
+    heads += ["force left there"] * bool(comparisons[0].missing.equations)
     for c in comparisons:
-        rms = dict(zip(c.missing.coordinates, c.missing.rms, strict=True))
+        rms = dict(zip(c.missing.equations, c.missing.rms, strict=True))
         left = {name: f"{x:.3g} {c.missing.units(name)['force']}" for name, x in rms.items()}
         before = [c.record.name] * (len(comparisons) > 1)
         rows += [
-            [*before, str(v.sensor), percent(v.error), _in_units(c, i), percent(floor), left[v.sensor.coordinate]]
+            [
+                *before,
+                str(v.sensor),
+                percent(v.error),
+                _in_units(c, i),
+                percent(floor),
+                *(left[name] for name in c.missing.equations if name == v.sensor.coordinate),
+            ]
             for i, (v, floor) in enumerate(zip(c.views, c.prediction.floors, strict=True))
         ]
     return [""] * (len(comparisons) > 1) + heads, rows
@@ -389,14 +411,13 @@ def _headline(comparison: Comparison) -> str:
     by = "" if comparison.estimator == FREE_RUN else f" by {comparison.estimator}"
     fit, judge = comparison.spans
     response = "of each sensor" if comparison.model.named else comparison.plan.response
+    force = "; force: rms that the equation of motion leaves" if comparison.missing.equations else ""
     if comparison.forces:
         low, high = comparison.force.frequency[comparison.force.band][[0, -1]]
-        force = f"share of power unexplained, {low:.3g} to {high:.3g} Hz"
-    else:
-        force = "rms that the equation of motion leaves"
+        force = f"; force: share of power unexplained, {low:.3g} to {high:.3g} Hz"
     return (
         f"model {comparison.model.name}: fitted to samples {fit[0]} to {fit[1]}{by}, judged on {judge[0]} to "
-        f"{judge[1]}\nresponse: free run, rms difference over rms {response}; force: {force}"
+        f"{judge[1]}\nresponse: free run, rms difference over rms {response}{force}"
     )
 
 

@@ -102,13 +102,20 @@ def _of_equations(comparison: Comparison) -> list[str]:
         said.append(f"the reverse system says no force of {', '.join(missing.lacking)}, which no sensor shows")
     if np.any(missing.rms > 0.0):
         i = int(np.argmax(missing.rms))
-        name = missing.coordinates[i]
+        name = missing.equations[i]
         left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms are left of its forces"
         said.append(f"the equation of {name} is violated most: {left}")
     if len(comparison.views) > 1:
         place, share = missing.aligned[0]
         said.append(
             f"a single force {place_in_words(place)} could make {percent(share)} of what stands above the noise"
+        )
+    for spectrum in comparison.by_line:
+        (mean, error), (imaginary, wrong), (trend, slope) = spectrum.mean, spectrum.imaginary, spectrum.trend
+        said.append(
+            f"line by line {spectrum.key} is {mean:.4g} +- {1.96 * error:.2g}, its imaginary part {imaginary:.2g} +- "
+            f"{1.96 * wrong:.2g} and its rise over the band {trend:.2g} +- {1.96 * slope:.2g}, which are zero for a "
+            "term that is the right one at the right place"
         )
     return said
 

@@ -66,6 +66,8 @@ def missing_force_spectra(comparison: Comparison) -> tuple[Floats, dict[frozense
 def dynamic_stiffnesses(comparison: Comparison) -> dict[frozenset[str], DynamicStiffness]:
     """The dynamic stiffness of every connection with a linear term; none where no equation or line can be read."""
     model, prepared = comparison.fit.model, comparison.prepared
+    if not comparison.missing.equations:
+        return {}
     try:
         equations, _ = equations_of(model, prepared)
     except StudyError:

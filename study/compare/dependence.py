@@ -21,7 +21,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import judging_run, run_of, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline, baseline, modulation_lines, residual_lines
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.records.spectra import StretchTransforms
 from study.support import statistics
@@ -94,11 +94,11 @@ def unexplained(base: Baseline) -> Unexplained:
     shaped = _with_shapes(fit, [text for texts in exact.values() for text in texts])
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
     joined = bool(prepared.record.stretches)
-    states = 0 if fit.restarts or joined or prepared.response == FORCE else len(motions)
     try:
         slopes = with_states(shaped, prepared)
     except DivergenceError:  # what shapes add may leave the range of numbers where the motion does not
         exact, shaped, slopes = {}, fit, with_states(fit, prepared)
+    states = 0 if fit.restarts or joined else slopes.shape[1] - len(shaped.keys)
     rows = [free, fit.residual, _columns(slopes, len(shaped.keys), states, joined)]
     spans = [fit.span]
     try:

@@ -8,10 +8,13 @@ instead of a gate leaves a part of the missing motion out everywhere, which flat
 damping then shows a power of 2.6 at 1 % noise, with the gate 2.8.)
 
 A single mass has one equation, and one place where a force may be missing. In a structure a force that is missing
-between two coordinates is in both equations, with opposite signs.
+between two coordinates is in both equations, with opposite signs. Modes have no equation of motion of a coordinate:
+there the missing force of a place is what makes, through them, most of what the sensors show beyond the model.
 """
 
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,13 +31,17 @@ from study.equations.equations_of_motion import acceleration_program
 from study.equations.linear_part import alignment, connections, matrices, transfer
 from study.equations.model import Model, named_channels
 from study.equations.place import HERE, Place
+from study.identify.frequency_domain.coefficient_spectra import driven_lines
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
+from study.identify.frequency_domain.modal_lines import unit_forces
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
 from study.records.noise_floor import CLEAR, SMOOTH
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Sensor
+from study.records.spectra import Segments
 from study.support.arrays import Complexes, Floats
+from study.support.errors import DivergenceError
 
 LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
 Bools = NDArray[np.bool_]
@@ -71,7 +78,7 @@ class Unbalanced:
 
     model: Model  # the fitted one
     record: Record  # which it is of, for its units
-    coordinates: tuple[str, ...]  # whose equations these are: those that are measured
+    coordinates: tuple[str, ...]  # that are measured
     motion: Floats  # displacement, velocity and acceleration of all coordinates, free of noise; (3, n, coordinates)
     force: Floats  # measured forces less inertia and all forces of the model; shape (n, s)
     free: Floats  # its derivatives by each fitted coefficient; shape (n, s, p)
@@ -83,6 +90,11 @@ class Unbalanced:
     aligned: tuple[tuple[Place, float], ...]  # share of what is left of the motions that a single force could make
     dt: float  # sampling interval in seconds
     edge: int  # samples at each end which filters and integrals leave unsure
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """Coordinates whose equations of motion these are; none where the linear part is a sum of modes."""
+        return () if self.model.modal else self.coordinates
 
     @property
     def inner(self) -> slice:
@@ -101,7 +113,9 @@ class Unbalanced:
 
     @property
     def share(self) -> float:
-        """Power of what is left over that of the forces of inertia."""
+        """Power of what is left over that of the forces of inertia; not a number where there is no equation."""
+        if not self.equations:
+            return math.nan
         power = float(np.sum(self.inertia**2))
         return float(np.sum(self.rms**2)) / power if power > 0.0 else 0.0
 
@@ -154,6 +168,46 @@ class Unbalanced:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class BesideModes(Unbalanced):
+    """The same of a modal linear part: no equation, but what the sensors show beyond the model.
+
+    The force f of a term that is missing along e takes ``H e f`` from what they show, with H the paths of the linear
+    part: so f follows at each line by least squares over the sensors, each in shares of its size.
+    """
+
+    sensors: tuple[Sensor, ...]
+    lacking_motion: Floats  # what they show less than the model, over the size of each; shape (n, s)
+    slopes: Floats  # its derivatives by each fitted coefficient; shape (n, s, p)
+    size: Floats  # rms of each sensor's motion; shape (s,)
+
+    def at(self, place: Place) -> MissingForce:
+        """The force that is missing at a place, as all sensors together have it."""
+        e, n = np.array(place.direction(self.model.coordinates)), len(self.lacking_motion)
+        both = np.concatenate([self.lacking_motion[:, :, None], self.slopes], axis=2)
+        longer, edge = _continued(both, self.frequency, self.dt)
+        size, gate = next_fast_len(len(longer), real=True), np.any(self.gates, axis=1)
+        lines = np.asarray(rfft(longer, size, axis=0), dtype=np.complex128)
+        at = np.asarray(rfftfreq(size, self.dt), dtype=np.float64)
+        sure = np.asarray(np.interp(at, self.frequency, gate.astype(np.float64)), dtype=np.float64)
+        found = _history(np.einsum("f,fs,fsp->fp", sure, self._inverse(e, size), lines), size)[edge : edge + n]
+        largest = float(np.max(self.noise))
+        noise = self.noise / largest if largest > 0.0 else np.ones(len(self.size))
+        inverse = np.abs(self._inverse(e, 2 * (len(self.frequency) - 1))) / self.size
+        power = np.sqrt(np.sum(noise * inverse**2, axis=1))
+        u, v = (x @ e for x in self.motion[:2])
+        return MissingForce(
+            displacement=u, velocity=v, force=found[:, 0], free=found[:, 1:], gate=gate,
+            weight=1.0 / np.maximum(power, np.finfo(float).tiny), frequency=self.frequency, noise=largest, dt=self.dt,
+            edge=self.edge,
+        )  # fmt: skip
+
+    def _inverse(self, e: Floats, size: int) -> Complexes:
+        """Force along e for what each sensor shows over its size, shape (lines, s), on lines of ``size`` samples."""
+        paths = transfer(self.model, self.sensors, self.dt, size) @ e / self.size
+        return paths.conj() / np.maximum(np.sum(np.abs(paths) ** 2, axis=1), np.finfo(float).tiny)[:, None]
+
+
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
     """The missing force of a single mass; see :func:`unbalanced`."""
     return unbalanced(model, keys, prediction).at(HERE)
@@ -172,6 +226,8 @@ def unbalanced(model: Model, keys: Sequence[str], prediction: Prediction) -> Unb
     prepared, noises = prediction.prepared, [view.noise for view in prediction.views]
     frequency, low = noises[0].frequency, prepared.band[0]
     gates = np.stack([lines_above_noise(noise, low) for noise in noises], axis=1)
+    if model.modal:
+        return _beside_modes(model, keys, prediction, gates)
     motion = _motion(model, prediction, gates, frequency)
     forces, inertia = _forces(model, keys, motion, prepared.record.part(*prepared.plan.judge))
     rows = [model.coordinates.index(c) for c in prepared.coordinates]
@@ -196,6 +252,41 @@ def _along_a_known_motion(model: Model, keys: Sequence[str], prediction: Predict
         model, prepared.record, model.coordinates, np.stack([part[m] for m in MOTIONS])[:, :, None],
         seen.difference[:, None], free[:, None], np.zeros(1), lines[:, 0] > 0.0, lines.astype(np.complex128),
         seen.noise.frequency, np.array([seen.noise.rms**2]), ((HERE, 1.0),), prediction.dt, 0,
+    )  # fmt: skip
+
+
+def _beside_modes(model: Model, keys: Sequence[str], prediction: Prediction, gates: Bools) -> BesideModes:
+    """The same where the linear part is a sum of modes, in the band that the forces drive: they are known in no other.
+
+    The terms act along the motion of the structure, not along that of the free run: what they would add to it for that
+    passes through the modes as well.
+    """
+    prepared, run, noises = prediction.prepared, prediction.run, [view.noise for view in prediction.views]
+    part, frequency, n = prepared.record.part(*prepared.plan.judge), noises[0].frequency, len(prediction.misfit)
+    cut = Segments(length=2 * (len(frequency) - 1))
+    gates &= np.any([driven_lines(part[force], prepared.dt, cut) for force in part.forces], axis=0)[:, None]
+    motion = _motion(model, prediction, gates, frequency)
+    free = prediction.motions([Sensor(c, m) for m in MOTIONS for c in model.coordinates])
+    acting = [unit_forces(model, part, x) for x in (motion, free.reshape(n, len(MOTIONS), -1).transpose(1, 0, 2))]
+    beyond, size = prediction.misfit.copy(), next_fast_len(2 * n, real=True)
+    paths, values = transfer(model, prepared.sensors, prepared.dt, size), model.numbers()
+    places = [(symbol, entry.place) for entry in model.terms for symbol in entry.symbols]
+    for (symbol, place), along, before in zip(places, *acting, strict=True):
+        lines = np.asarray(rfft(values[symbol] * (along - before), size), dtype=np.complex128)
+        through = paths @ np.array(place.direction(model.coordinates)) * lines[:, None]
+        beyond += _history(through, size)[:n]
+    slopes = np.zeros((beyond.size, len(keys)))
+    if run is not None and keys:
+        with suppress(DivergenceError):
+            slopes = run.derivatives(run.fit)[:, : len(keys)]
+    slopes = slopes.reshape(*beyond.shape, len(keys)) / np.array(prepared.outputs.weights)[:, None]
+    width = float(frequency[1])
+    noise = [float(np.sum(x.density[gate]) * width) for x, gate in zip(noises, gates.T, strict=True)]
+    return BesideModes(
+        model, prepared.record, prepared.coordinates, motion, np.zeros((n, 0)), np.zeros((n, 0, len(keys))),
+        np.zeros(0), gates, np.zeros((len(frequency), 0, len(noises)), dtype=np.complex128), frequency,
+        np.array(noise), _aligned(model, prediction, gates, frequency), prediction.dt, _edge(prediction, width),
+        prepared.sensors, -beyond / prediction.size, slopes / prediction.size[:, None], prediction.size,
     )  # fmt: skip
 
 
@@ -293,11 +384,20 @@ def _aligned(
 
 def _filtered(values: Floats, dt: float, frequency: Floats, gain: Floats) -> Floats:
     """Values through a real gain without delay; the ends are continued by point reflection."""
-    n = len(values)
-    edge = min(n - 1, round(2.0 / (float(frequency[1]) * dt)))
-    before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
-    longer = np.concatenate([before, values, after])
+    longer, edge = _continued(values, frequency, dt)
     size = next_fast_len(len(longer), real=True)
     lines = np.asarray(rfftfreq(size, dt))
     spectrum = rfft(longer, size) * np.interp(lines, frequency, gain)
-    return np.asarray(irfft(spectrum, size)[edge : edge + n], dtype=np.float64)
+    return np.asarray(irfft(spectrum, size)[edge : edge + len(values)], dtype=np.float64)
+
+
+def _history(lines: Complexes, size: int) -> Floats:
+    """Histories of so many samples, side by side, from their lines."""
+    return np.asarray(irfft(lines, size, axis=0), dtype=np.float64)
+
+
+def _continued(values: Floats, frequency: Floats, dt: float) -> tuple[Floats, int]:
+    """Values with point reflections at both ends, and how many samples of them there are at each."""
+    edge = min(len(values) - 1, round(2.0 / (float(frequency[1]) * dt)))
+    before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
+    return np.concatenate([before, values, after]), edge

@@ -38,13 +38,13 @@ def sensor_errors(axes: Axes, prediction: Prediction) -> Axes:
 
 def coordinate_forces(axes: Axes, forces: Unbalanced) -> Axes:
     """Rms force that each measured coordinate's equation leaves, beside that of its inertia."""
-    place = np.arange(len(forces.coordinates))
+    place = np.arange(len(forces.equations))
     axes.barh(place, forces.inertia, height=0.6, color="0.82", label="force of inertia")
     axes.barh(place, forces.rms, height=0.3, color="C1", label="left of the equation")
-    axes.set_yticks(place, forces.coordinates)
+    axes.set_yticks(place, forces.equations)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.2 * float(max(np.max(forces.inertia), np.max(forces.rms), 1e-300)))
-    for y, left, name in zip(place, forces.rms, forces.coordinates, strict=True):
+    for y, left, name in zip(place, forces.rms, forces.equations, strict=True):
         axes.annotate(
             f"{left:.3g} {forces.units(name)['force']}", (float(left), y), xytext=(4, 0), textcoords="offset points",
             va="center", fontsize=8,
@@ -55,7 +55,7 @@ def coordinate_forces(axes: Axes, forces: Unbalanced) -> Axes:
 
 def shared_force(axes: Axes, forces: Unbalanced) -> Axes:
     """Shares of the residual force that two equations hold with opposite signs; on the diagonal, from outside."""
-    names, share = list(forces.coordinates), 100.0 * forces.matrix
+    names, share = list(forces.equations), 100.0 * forces.matrix
     axes.imshow(share, cmap="Oranges", vmin=0.0, vmax=100.0, aspect="auto")
     for (i, j), value in np.ndenumerate(share):
         axes.text(
@@ -87,7 +87,8 @@ def mode_frequencies(axes: Axes, sets: Sequence[tuple[str, Modes]]) -> Axes:
 
 
 def mode_shapes(axes: Axes, sets: Sequence[tuple[str, Modes]], number: int, coordinates: Sequence[str]) -> Axes:
-    """One mode shape with 95 % intervals, of the model before and after."""
+    """One mode shape with 95 % intervals, of the model before and after, if it has so many modes."""
+    sets = [(label, modes) for label, modes in sets if number < len(modes.frequency)]
     place = np.arange(len(coordinates), dtype=np.float64)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     looks = zip(sets, ("s", "o"), ("0.55", "C0"), (-0.06, 0.06), strict=False)

@@ -26,7 +26,8 @@ def place_figures(comparison: Comparison) -> dict[str, Figure]:
     """The pictures that a structure has besides those of any comparison, by file name."""
     return {
         "structure": structure_figure(comparison, sketch_of(comparison)), "sensors": sensors_figure(comparison),
-        "shared_force": shared_force_figure(comparison), "modes": modes(comparison, [("fitted", comparison.modes)]),
+        **({"shared_force": shared_force_figure(comparison)} if comparison.missing.equations else {}),
+        "modes": modes(comparison, [("fitted", comparison.modes)]),
         **restoring_forces(comparison),
     }  # fmt: skip
 
@@ -55,17 +56,19 @@ def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
 
 
 def sensors_figure(comparison: Comparison) -> Figure:
-    """Errors by sensor, and the force left at each coordinate."""
+    """Errors by sensor, and the force that is left of each equation of motion."""
     prediction, count = comparison.prediction, len(comparison.prediction.prepared.outputs.sensors)
+    columns = 2 if comparison.missing.equations else 1
     figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: error by sensor",
         f"model {comparison.model.name}; all sensors {percent(prediction.error)}, noise {percent(prediction.floor)}",
-        columns=2, width=page.width(2), panel=max(1.4, 0.48 * count), share=False,
+        columns=columns, width=page.width(columns), panel=max(1.4, 0.48 * count), share=False,
     )  # fmt: skip
-    figure.subplots_adjust(left=0.13, wspace=0.3)
+    figure.subplots_adjust(left=0.26 / columns, wspace=0.3)
     place_panels.sensor_errors(axes[0], prediction)
-    place_panels.coordinate_forces(axes[1], comparison.missing)
-    page.letter(axes, ("motions", "equations of motion"))
+    for panel in axes[1:]:
+        place_panels.coordinate_forces(panel, comparison.missing)
+    page.letter(axes, ("motions", "equations of motion")[:columns])
     page.shared_legend(figure, axes, columns=4)
     return figure
 
@@ -95,7 +98,7 @@ def responses_figure(comparison: Comparison) -> Figure:
 
 def shared_force_figure(comparison: Comparison) -> Figure:
     """The matrix of shared residual force between places."""
-    count = len(comparison.missing.coordinates)
+    count = len(comparison.missing.equations)
     figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: shared residual force",
         "off the diagonal it acts between two coordinates, on it from outside or the ground",
@@ -129,7 +132,8 @@ def restoring_forces(comparison: Comparison) -> Mapping[str, Figure]:
 
 def modes(comparison: Comparison, sets: list[tuple[str, Modes]]) -> Figure:
     """Natural frequencies, damping ratios and shapes with 95 % intervals, before and after."""
-    names, count = comparison.model.coordinates, min(MODES, len(comparison.modes.frequency))
+    names = comparison.model.coordinates
+    count = min(MODES, max(len(found.frequency) for _, found in sets))
     figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: modes of the underlying linear system",
         f"model {comparison.model.name}; bars are 95 % intervals",

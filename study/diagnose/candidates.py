@@ -102,7 +102,7 @@ def screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:
         return Screened(entry, tuple(shape_starts(entry, base)))
 
     tried = side_by_side(points, entries, lambda entry: entry.term.effort)
-    return sorted((item for item in tried if item.points), key=lambda item: -item.share)
+    return sorted((item for item in tried if item.points and item.share > 0.0), key=lambda item: -item.share)
 
 
 def worth_fitting(ordered: Sequence[Screened]) -> list[Screened]:

@@ -104,4 +104,5 @@ def _candidate(row: Ranked, rows: dict[str, Ranked], named: bool) -> dict[str, A
         "tied_with": [{"term": rows[n].term.name, **where(rows[n])} if named else n for n in row.tied_with],
         "distance": row.distance if math.isfinite(row.distance) else None,
         "unphysical": row.unphysical, "converged": row.fit.converged,
+        **({"modes": row.fit.model.modal.count} if row.fit.model.modal else {}),
     }  # fmt: skip

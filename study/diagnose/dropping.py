@@ -90,7 +90,7 @@ def compared_without(comparison: Comparison, name: str) -> Comparison:
     model, given = fit.model.without_term(name), comparison.model.without_term(name)
     held = tuple(key for key in fit.held if key in model.values)
     begin = removal(fit, name, linearise(fit, prepared)).start if fit.keys and not fit.restarts else {}
-    if len(held) == len(model.values):
+    if len(held) == len(model.values) or model.modal:  # without the term a record may ask for other modes
         return compare(given, prepared)
     fits = list[FreeRunFit]()
     with suppress(StudyError):

@@ -39,10 +39,9 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
         steps = max(one.fit.steps_per_sample, other.fit.steps_per_sample) if fine else STEPS
         ready = partial(prepare, record=louder, sensors=prepared.outputs.sensors, span=span, steps_per_sample=steps)
         try:
-            ahead = ready(one.fit.model)
-            initial = np.zeros((len(ahead.cuts) + 1, ahead.moving)) if begin is None else begin
-            target = ahead.respond({}, initial)[0]
-            nearest, jacobian = ready(other.fit.model, keys=other.fit.keys).respond(values, initial)
+            runs = ready(one.fit.model), ready(other.fit.model, keys=other.fit.keys)
+            rest = (np.zeros((len(run.cuts) + 1, run.moving)) if begin is None else begin for run in runs)
+            target, (nearest, jacobian) = runs[0].respond({}, next(rest))[0], runs[1].respond(values, next(rest))
         except StudyError:
             continue
         gap, jacobian = (prepared.outputs.stacked(x) for x in (target - nearest, jacobian))

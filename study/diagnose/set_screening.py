@@ -100,7 +100,7 @@ def beside(
     known = fit.model.numbers()
 
     def started(names: frozenset[str]) -> SetStart:
-        model = base.fit.model.with_values({key: known[key] for key in base.fit.model.values})
+        model = replace(base.fit.model, modal=fit.model.modal).with_values(known)
         for name in (n for n in offered if n in names):
             entry = members.get(name) or replace(offered[name], coefficients=(0.0,) * len(offered[name].symbols))
             model = model.with_term(entry)

@@ -52,9 +52,10 @@ class SetSearch:
 
     def _fitted(self, start: SetStart) -> FittedCandidate | None:
         prepared, begun = self.base.prepared, self.base.fit if start.beside is None else start.beside.fit
+        held = begun.held if start.model.modal else self.base.fit.held  # modes that damping does not couple stay so
         try:
             fit = fit_part(
-                start.model, prepared, self.base.fit.held, steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
+                start.model, prepared, [k for k in held if k in start.model.values], steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
                 max_iterations=TRIED, initial=grown_states(begun, start.model),
             )
             return judged_candidate(tuple(e for n, e in self.entries.items() if n in start.names), fit, prepared)

@@ -7,6 +7,7 @@ matrices are those of the degrees of freedom q, ``u = T q``: of the coordinates,
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from scipy.fft import rfftfreq
@@ -111,7 +112,8 @@ def connections(model: Model) -> tuple[Place, ...]:
     """Every pair where an effect may be missing: between the ground and each coordinate, and between neighbours.
 
     Neighbours are what a term of the model ties together. Two coordinates that inertia couples are motions of one body,
-    as heave and pitch: nothing lies between them. A single mass has the one place where all of its terms act.
+    as heave and pitch: nothing lies between them. A single mass has the one place where all of its terms act. A modal
+    linear part does not say which coordinates are neighbours: each two may be.
     """
     if not model.named:
         return (HERE,)
@@ -121,6 +123,8 @@ def connections(model: Model) -> tuple[Place, ...]:
             found.setdefault(entry.place.path, entry.place)
     for name in model.coordinates:
         found.setdefault(frozenset((GROUND, name)), Place("between", (GROUND, name)))
+    for ends in combinations(model.coordinates, 2) if model.modal else ():
+        found.setdefault(frozenset(ends), Place("between", ends))
     return tuple(found.values())
 
 

@@ -96,7 +96,8 @@ def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
 def format_model(model: Model) -> str:
     """The model as YAML text with every known value; :func:`parse_model` gives the same model back."""
     head = f"name: {scalar(model.name)}\n" + layout.written(model)
-    return f"{head}terms:\n" + "".join(f"  - {format_entry(t)}\n" for t in model.terms)
+    entries = "".join(f"  - {format_entry(t)}\n" for t in model.terms)
+    return f"{head}terms:\n{entries}" if entries else f"{head}terms: []\n"
 
 
 def format_entry(entry: ModelTerm) -> str:

@@ -329,6 +329,23 @@ def one_sided(term: Term) -> bool:
     return False
 
 
+def is_linear(term: Term) -> bool:
+    """Whether its forces at two motions add up to that at their sum, at any time: no mode is needed beside it."""
+    parameters = {p.name: 0.3 + 0.1 * i for i, p in enumerate(term.parameters)}
+    for text in [c.shape for c in term.components] + ([term.state] if term.state else []):
+        if not {"u", "v", "z", *parameters}.issuperset(formulas.names(text)):
+            return False
+        graph = Graph()
+        program = graph.program([formulas.add_formula(graph, text, {n: graph.input(n) for n in formulas.names(text)})])
+        other = (-1.9, 1.1, 0.5)
+        for one in ((0.7, -0.4, 0.2), (1.3, 0.6, -0.9), (-0.2, -1.7, 0.4)):
+            motions = one, other, tuple(a + b for a, b in zip(one, other, strict=True))
+            parts = [_value(program, {**parameters, **dict(zip("uvz", own, strict=True))}) for own in motions]
+            if abs(parts[0] + parts[1] - parts[2]) > 1e-9:
+                return False
+    return True
+
+
 def _value(program: Program, values: dict[str, float]) -> float:
     known = program.with_inputs({name: values.get(name, 0.3) for name in program.inputs})
     return float(kernels.evaluate(known, {}, 1)[0, 0])

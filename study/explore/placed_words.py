@@ -46,7 +46,7 @@ def _figures(comparison: Comparison) -> str:
         ("error", "Error of the motions", in_percent(prediction.error), about),
         ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain"),
         ("force", "Error of the forces", in_percent(comparison.missing.share), "of the power of those of inertia"),
-    )  # fmt: skip
+    )[: 3 if comparison.missing.equations else 2]  # fmt: skip
     return "".join(figure(*cell) for cell in cells)
 
 
@@ -116,13 +116,16 @@ def _modes(stage: Stage) -> str:
     names: Sequence[str] = stage.comparison.model.coordinates
     rows = "".join(
         f"<tr><td>{i + 1}</td>{''.join(_mode(m, i) for _, m in sets)}<td>{_shape(sets[-1][1], i)}</td></tr>"
-        for i in range(len(names))
+        for i in range(max(len(m.frequency) for _, m in sets))
     )
     under += f"<th>shape at {escape(', '.join(names))}</th>"
     return f"<table><tr><th></th>{heads}<th></th></tr><tr><th></th>{under}</tr>{rows}</table>"
 
 
 def _mode(m: Modes, i: int) -> str:
+    """Frequency and damping ratio; empty where a model has fewer modes."""
+    if i >= len(m.frequency):
+        return "<td colspan=2></td>"
     return (
         f"<td class='number'>{' ± '.join(with_error(m.frequency[i], 1.96 * m.frequency_error[i]))}</td>"
         f"<td>{' ± '.join(with_error(100.0 * m.damping[i], 196.0 * m.damping_error[i]))}</td>"
@@ -130,4 +133,4 @@ def _mode(m: Modes, i: int) -> str:
 
 
 def _shape(m: Modes, i: int) -> str:
-    return ", ".join(f"{x:.2f}" if math.isfinite(x) else "-" for x in m.shape[i])
+    return ", ".join(f"{x:.2f}" if math.isfinite(x) else "-" for row in m.shape[i : i + 1] for x in row)

@@ -39,6 +39,7 @@ from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
+NOT_ASKED_OF_MODES = "faults of the measurement are not looked for beside 'linear: modal'"
 NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 
@@ -118,7 +119,8 @@ def accounted(
     asked = asked_of(prepared, [name for name in FAULTS if name not in switched_off], given)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
     if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE or model.modal):
-        asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
+        said = NOT_ASKED_OF_MODES if model.modal else NOT_ASKED
+        asked, prepared = (), replace(prepared, notes=(*prepared.notes, said))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
     needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if as_sampled else without_spare_samples

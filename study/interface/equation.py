@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from study.equations import model as equations
 from study.equations import model_file, terms
+from study.equations.modal_part import ModalPart
 from study.equations.model import ModelTerm
 from study.equations.place import HERE, Kind, Place
 from study.equations.redundancy import repeated_force
@@ -117,6 +118,8 @@ class Model:
         Of a structure: where sensors, forces and terms are. Each term then says where it acts.
     forces : mapping of str, optional
         Of a structure: name of each measured force to the coordinate on which it acts.
+    modal : bool
+        Whether a structure's linear part is a sum of modes, as many as a record shows; its terms are nonlinear alone.
 
     Attributes
     ----------
@@ -138,17 +141,19 @@ class Model:
 
     def __init__(
         self, *terms: "str | ModelTerm", name: str = "model", coordinates: Sequence[str] = (),
-        forces: Mapping[str, str] | None = None,
+        forces: Mapping[str, str] | None = None, modal: bool = False,
     ) -> None:  # fmt: skip
         entries = tuple(term(t) if isinstance(t, str) else t for t in terms)
-        expect(entries, "a model needs terms; expected some such as Model('inertia', 'linear_stiffness')")
+        expect(entries or modal, "a model needs terms; expected some such as Model('inertia', 'linear_stiffness')")
         made = equations.Model(
             name, tuple(ModelTerm(e.term, e.coefficients, e.parameters, e.place) for e in entries),
         )  # fmt: skip
         if coordinates:
             made = replace(made, coordinates=tuple(coordinates), forces=tuple((forces or {}).items()))
+            made = replace(made, modal=ModalPart(made.coordinates) if modal else None)
             made = model_file.parse_model(model_file.format_model(made), Path(name))  # with the checks of a file
         else:
+            expect(not modal, "modal=True is of a structure; expected coordinates=[...] beside it")
             placed = [e.name for e in entries if e.place != HERE] + list(forces or {})
             expect(not placed, f"{', '.join(placed)} has a place; expected coordinates=[...] beside it")
             fault = repeated_force(made)
@@ -171,10 +176,7 @@ class Model:
         StudyError
             If the file cannot be read or is no model, naming the file, the value and what was expected.
         """
-        made = model_file.read_model(Path(path))
-        modal = f"{path}: 'linear: modal' is for 'study compare' and 'study diagnose'"
-        expect(made.modal is None, f"{modal}; expected inertia at every coordinate in a notebook")
-        return cls.of(made)
+        return cls.of(model_file.read_model(Path(path)))
 
     def save(self, path: str | Path, *, values: bool = True) -> None:
         """Write a model file, with the values that are known or (``values=False``) without any.
@@ -260,7 +262,8 @@ class Model:
         return self._with_terms(*(t for t in self.equation.terms if t.name != gone))
 
     def _with_terms(self, *entries: ModelTerm) -> "Model":
-        return Model(*entries, name=self.name, coordinates=self.coordinates, forces=self._forces)
+        modal = self.equation.modal is not None
+        return Model(*entries, name=self.name, coordinates=self.coordinates, forces=self._forces, modal=modal)
 
     @property
     def _forces(self) -> dict[str, str] | None:

@@ -287,8 +287,9 @@ class Fit(FitPictures):
         """
         from study.diagnose.dropping import compared_without
 
-        kept = self.given.drop(name, at=at, between=between).terms if self.given.coordinates else ()
-        gone = next((t for t in self.given.terms if t not in kept), name) if kept else name
+        placed = bool(self.given.coordinates)
+        kept = self.given.drop(name, at=at, between=between).terms if placed else ()
+        gone = next(t for t in self.given.terms if t not in kept) if placed else name
         return replace(self, comparison=compared_without(self.comparison, gone))
 
     def across(self, records: "Sequence[Record]", **options: Any) -> "Across":

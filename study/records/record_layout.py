@@ -145,8 +145,8 @@ def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: Kind
     asked = len(records) > 1 or layout.alternate or layout.use
     expect(
         not (kind.unbroken and asked),
-        "the linear part of the model is as measured: frequency response functions want one long stretch; expected "
-        "--fit A:B and --judge A:B instead of stretches",
+        "the linear part of the model is a sum of modes, which are found in one long stretch; expected --fit A:B and "
+        "--judge A:B instead of stretches, and a diagnosis of each record (--each) instead of one of all",
     )
     for record in records if kind.prescribed else ():
         expect(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.compare.modal_comparison import ModalComparison
+from study.compare.comparison import Comparison
 from study.equations.linear_part import modes_of, transfer
 from study.equations.model import Model
 from study.identify.frequency_domain.conditioned import MisoResult
@@ -119,38 +119,36 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
 
 
 def modal_parameters(
-    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients with their tolerance, then natural frequencies and damping ratios beside the exact ones."""
     modes, exact = comparison.modes, modes_of(truth)
     allowed, rows = settings.tolerances.measured.coefficient, list[tuple[Any, ...]]()
-    for key in comparison.model.values:
-        true, value = truth.numbers()[key], comparison.values[key]
+    for found in comparison.coefficients:
+        key, value, true = found.key, found.value, truth.numbers()[found.key]
         off = value / true - 1.0
-        rows.append(
-            (case.case, BY_MODES, key, true, value, comparison.error(key), off, allowed, abs(off) <= allowed, "")
-        )
+        rows.append((case.case, BY_MODES, key, true, value, found.error or 0.0, off, allowed, abs(off) <= allowed, ""))
     for r, frequency in enumerate(modes.frequency.tolist()):
         k = int(np.argmin(np.abs(exact.frequency - frequency)))
-        for name, true, found, error in (
+        for name, true, value, error in (
             ("f_n", exact.frequency[k], modes.frequency[r], modes.frequency_error[r]),
             ("zeta", exact.damping[k], modes.damping[r], modes.damping_error[r]),
         ):
-            off = float(found / true) - 1.0
-            told = (float(true), float(found), float(error), off)
+            off = float(value / true) - 1.0
+            told = (float(true), float(value), float(error), off)
             rows.append((case.case, BY_MODES, f"{name}[{k + 1}]", *told, np.nan, "", ""))
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
 def modal_responses(
-    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones."""
     parts: list[tuple[Any, ...]] = []
     units = {
         key: t.term.unit(s, "N", "m") for t in truth.terms for key, s in zip(t.symbols, t.term.symbols, strict=True)
     }
-    for spectrum in comparison.spectra:
+    for spectrum in comparison.by_line:
         values, true = spectrum.values, truth.numbers()[spectrum.key]
         parts.append(
             (COEFFICIENT, spectrum.key, units[spectrum.key], spectrum.frequency, "instrumental", values.real,
@@ -204,7 +202,7 @@ def structure_claims(
 
 
 def modal_claims(
-    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
 ) -> pd.DataFrame:
     """The same of a case whose linear part is as measured."""
     return _judged(case, measured=_modal(case, truth, comparison, settings))
@@ -261,12 +259,12 @@ def _reaction(result: CaseResult, settings: StructureSettings) -> Iterable[Condi
 
 
 def _modal(
-    case: StructureCase, truth: Model, comparison: ModalComparison, settings: StructureSettings
+    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
 ) -> Iterable[Condition]:
     allowed = settings.tolerances.measured
-    for key in comparison.model.values:
-        true = truth.numbers()[key]
-        off = comparison.values[key] / true - 1.0
+    for found in comparison.coefficients:
+        key, true = found.key, truth.numbers()[found.key]
+        off = found.value / true - 1.0
         met = abs(off) <= allowed.coefficient
         yield Condition(
             f"{key} within {percent(allowed.coefficient)} of {true:.6g}", f"{key} {percent(off, '+.2g')}", met

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.compare.modal_comparison import compare_modal
+from study.compare.comparison import compare
 from study.equations.model_file import read_model
 from study.records.prepared import prepare_record
 from study.reproduction.structure_cases import (
@@ -119,7 +119,7 @@ def test_the_beam_is_found_by_its_own_modes():
     record, model = make_structure_record(structure, case, settings), measured_model(structure, case.sensors)
     assert [str(s) for s in record.sensors] == [f"{p} displacement" for p in case.sensors]
     assert model.values == {"k3[ground-p10]": None}
-    comparison = compare_modal(model, prepare_record(record))
+    comparison = compare(model, prepare_record(record))
     (claim,) = modal_claims(case, structure, comparison, settings).to_dict("records")
     assert claim["verdict"] == "holds", claim["measured"]
     table = modal_parameters(case, structure, comparison, settings)

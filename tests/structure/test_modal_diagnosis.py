@@ -7,14 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import study as st
 from study.cli import main
-from study.compare.modal_comparison import compare_modal
-from study.diagnose.modal_diagnosis import between_sensors, diagnose_modal, modal_entries
-from study.diagnose.modal_report import modal_in_words
+from study.compare.comparison import compare
+from study.diagnose.diagnosis_files import diagnosis_in_words
+from study.diagnose.verdict import diagnose
+from study.equations.linear_part import connections
 from study.equations.model_file import parse_model, read_model
+from study.equations.possible_effects import candidate_entries
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
-from study.identify.time_domain.modal_fit import modal_fit
+from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
 from study.records.record import Sensor, write_csv
@@ -57,7 +60,7 @@ def test_effect_and_place_are_named_and_add_finds_the_coefficient(folder, capsys
     assert first["coefficient"] == pytest.approx(1e5, rel=0.03)
     assert first["response_error"] == pytest.approx(first["noise_floor"], rel=0.05)
     assert first["response_error"] < 0.3 * found["error"]["response"]
-    assert "Cubic stiffness between the ground and p10 is missing" in capsys.readouterr().out
+    assert "Cubic stiffness is missing between the ground and p10" in capsys.readouterr().out
     command = ["add", model, "cubic_stiffness", "--between", "ground", "p10", "--data", data, "--out", out]
     assert main(command) == 0
     assert "k3[ground-p10]" in capsys.readouterr().out
@@ -69,16 +72,15 @@ def test_effect_and_place_are_named_and_add_finds_the_coefficient(folder, capsys
 def test_nothing_is_missing_from_the_right_model(record):
     model = parse_model(BARE.replace("[]", "\n  - {term: cubic_stiffness, between: [ground, p10]}"), Path("right.yaml"))
     asked = tuple(name for name in LIBRARY if name != "quadratic_stiffness")
-    diagnosis = diagnose_modal(compare_modal(model, prepare_record(record)), without=asked)
+    diagnosis = diagnose(compare(model, prepare_record(record)), without=asked)
     assert diagnosis.verdict == "nothing_missing"
-    assert "Nothing is missing" in modal_in_words(diagnosis)
+    assert "Nothing is missing" in diagnosis_in_words(diagnosis)
 
 
-def test_candidates_are_nonlinear_effects_between_sensors(record):
+def test_candidates_are_nonlinear_effects_between_sensors():
     model = parse_model(BARE, Path("bare.yaml"))
-    prepared = prepare_record(record)
-    assert len(between_sensors(model, prepared)) == 3
-    names = {e.term.name for e in modal_entries(model, prepared)}
+    assert [p.label for p in connections(model)] == ["ground-p4", "ground-p10", "p4-p10"]
+    names = {e.term.name for e in candidate_entries(model)}
     assert {"cubic_stiffness", "hysteresis", "dead_band", "coulomb_friction"} <= names
     assert not names & {
         "linear_stiffness",
@@ -100,8 +102,8 @@ def test_an_open_shape_parameter_is_searched_for():
     record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 16))
     shown = record.with_motions({s: x for s, x in record.motions.items() if s.motion == "displacement"})
     model = parse_model(f"{place}linear: modal\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
-    comparison = compare_modal(model, prepare_record(shown))
-    true, found = whole.numbers(), comparison.values
+    comparison = compare(model, prepare_record(shown))
+    true, found = whole.numbers(), comparison.fit.model.numbers()
     assert "dead_band[x].u_g" in comparison.fit.keys
     assert found["dead_band[x].u_g"] == pytest.approx(true["dead_band[x].u_g"], rel=0.02)
     assert comparison.prediction.error < 0.02
@@ -114,7 +116,17 @@ def test_a_shape_parameter_that_the_model_gives_is_held():
     whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
     record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 8))
     model = parse_model(f"{place}linear: modal\nterms: [{{term: hysteresis, at: x, beta: 200.0}}]", Path("one.yaml"))
-    fitted = modal_fit(model, prepare_record(record))
+    fitted = fit_model(model, prepare_record(record))
     assert fitted.model.numbers()["hysteresis[x].beta"] == 200.0
     assert "hysteresis[x].beta" in fitted.held
     assert "hysteresis[x].gamma" in fitted.keys
+
+
+@pytest.mark.long
+def test_a_notebook_takes_it_as_any_model(record):
+    bare = st.Model(name="bare", coordinates=["p4", "p10"], forces={"shaker": "p4"}, modal=True)
+    fit = bare.fit(st.Record.of(record))
+    grown = fit.add("cubic_stiffness", between=("ground", "p10"))
+    assert grown.error < 0.3 * fit.error
+    assert grown.model.values["k3[ground-p10]"] == pytest.approx(1e5, rel=0.03)
+    assert grown.drop("cubic_stiffness").error == pytest.approx(fit.error, rel=1e-3)

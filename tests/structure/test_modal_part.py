@@ -9,17 +9,23 @@ from scipy.linalg import eigh
 
 from study.cli import main
 from study.compare import history
-from study.compare.modal_comparison import compare_modal, modal_document, modal_says
+from study.compare.comparison import compare
+from study.compare.comparison_report import comparison_document
+from study.compare.missing_force import MissingForce, unbalanced
+from study.compare.prediction import predict
 from study.equations.free_run import prepare
 from study.equations.linear_part import matrices, modes_of, transfer
 from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
+from study.explore import session as sessions
+from study.explore.placed_view import placed_view
 from study.identify.frequency_domain.subspace import observability
+from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
-from study.records.record import Record, Sensor, record_of, write_csv
+from study.records.record import MOTIONS, Record, Sensor, record_of, write_csv
 from study.records.record_layout import Layout
 from study.support.errors import StudyError
 from study.way_in.compare_records import made_ready
@@ -121,12 +127,14 @@ def at_sensors(beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10
 
 @pytest.fixture(scope="module")
 def comparison(beam):
-    return compare_modal(modal(), prepare_record(at_sensors(beam)))
+    return compare(modal(), prepare_record(at_sensors(beam)))
 
 
 def test_the_cubic_spring_and_the_free_run_of_the_beam(comparison):
     """The proof that the issue asks for: 2 % at 1 % noise, and the error within 1.2 times the noise."""
-    value, error = comparison.values["k3[ground-p10]"], comparison.error("k3[ground-p10]")
+    (found,) = comparison.coefficients
+    value, error = found.value, found.error
+    assert found.key == "k3[ground-p10]"
     assert value == pytest.approx(1e5, rel=0.02)
     assert abs(value - 1e5) < 4.0 * error
     noise = np.sqrt(0.01 / 1.01)
@@ -143,7 +151,7 @@ def test_modes_in_the_band_are_those_of_the_structure(beam, comparison):
 
 
 def test_coefficients_line_by_line_are_real_and_flat(comparison):
-    (spectrum,) = comparison.spectra
+    (spectrum,) = comparison.by_line
     mean, error = spectrum.mean
     assert abs(mean - 1e5) < 4.0 * error < 0.5e5
     for value, error in (spectrum.imaginary, spectrum.trend):
@@ -154,12 +162,12 @@ def test_coefficients_line_by_line_are_real_and_flat(comparison):
 
 def test_a_term_at_the_wrong_place_leaves_the_error(beam):
     wrong = modal(MODAL.replace("[ground, p10]", "[p4, p7]"))
-    found = compare_modal(wrong, prepare_record(at_sensors(beam, samples=4000)))
+    found = compare(wrong, prepare_record(at_sensors(beam, samples=4000)))
     assert found.prediction.error > 1.1 * np.sqrt(0.01)
 
 
 def test_derivatives_of_the_free_run_are_exact(comparison):
-    fit, prepared, values = comparison.fit, comparison.prepared, comparison.values
+    fit, prepared, values = comparison.fit, comparison.prepared, comparison.fit.model.numbers()
     modal = fit.model.modal
     told = {"sensors": prepared.sensors, "steps_per_sample": fit.steps_per_sample, "span": (0, 300)}
     run = prepare(fit.model, prepared.record, tuple(values), **told)
@@ -189,7 +197,7 @@ def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, re
     noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
     model = modal("coordinates: [x]\nforces: {shaker: x}\nlinear: modal\nterms: [{term: cubic_stiffness, at: x}]")
     own = record.with_motions({Sensor("x", motion): noisy})
-    fitted = compare_modal(model, prepare_record(own)).fit.model
+    fitted = compare(model, prepare_record(own)).fit.model
     assert fitted.modal.count == 1
     values = fitted.numbers()
     mass = values["phi[x,1]"] ** -2
@@ -252,8 +260,10 @@ def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
     assert main(["compare", *words]) == 0
     assert "k3[ground-p10]" in capsys.readouterr().out
     assert (tmp_path / "out" / "comparison.json").stat().st_size > 1000
-    assert modal_document(comparison)["model"]["linear"] == "modal"
-    assert "Line by line" in modal_says(comparison)
+    document = comparison_document([comparison])
+    assert document["model"]["linear"] == "modal"
+    assert document["error"]["force"] != document["error"]["force"], "no equation of motion, no error of a force"
+    assert "Line by line" in document["says"]
 
 
 @pytest.mark.long
@@ -269,3 +279,35 @@ def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys)
     before, after = history.read_history(model)
     assert after["dropped"] == "cubic_stiffness[ground-p10]"
     assert after["error"]["response"] > 2.0 * before["error"]["response"]
+
+
+def test_the_force_that_is_missing_between_two_coordinates_is_told_through_the_modes(lumped_and_by_modes):
+    """A stop that the model lacks, beside the exact modes: the same as the equations of motion tell."""
+    lumped, own = lumped_and_by_modes
+    drive = {"shaker": force(Excitation(level=100.0, cutoff=8.0), 4000, 0.02, 5)}
+    whole = simulate(lumped, drive, 0.02, Integrator("rk4", 8))
+    prepared = prepare_record(whole.with_motions({s: x for s, x in whole.motions.items() if s.motion == MOTIONS[0]}))
+    (stop,) = own.terms
+    found: list[MissingForce] = []
+    for model in (lumped, own):
+        fit = fit_part(model.without_term(stop.name), prepared, tuple(model.without_term(stop.name).values), steps=8)
+        missing = unbalanced(fit.model, fit.keys, predict(fit, prepared))
+        found.append(missing.at(next(p for p in missing.shown if p.path == stop.place.path)))
+    assert missing.equations == ()
+    k, gap = (stop.values[key] for key in stop.keys)
+    judged = slice(*prepared.plan.judge)
+    ends = {end: whole[Sensor(end, MOTIONS[0])][judged] for end in stop.place.ends}
+    true = k * np.maximum(ends[stop.place.ends[1]] - ends[stop.place.ends[0]] - gap, 0.0)
+    for lacking in found:
+        seen, wanted = (lacking.weighted(x)[lacking.inner] for x in (lacking.force, true))
+        assert np.std(seen - wanted) < 0.05 * np.std(wanted)
+
+
+def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_forces(comparison):
+    shown = placed_view(sessions.begin_with(comparison).now, 0)
+    words = dict(zip(shown.columns["words"]["place"], shown.columns["words"]["html"], strict=True))
+    assert "Error of the motions" in words["figures"]
+    assert "Error of the forces" not in words["figures"]
+    assert words["modes"].count("<tr>") == 2 + len(comparison.modes.frequency)
+    assert len(shown.drawn.links) == 6, "each sensor to the ground, and each two"
+    assert len(shown.columns["all_motion"]["of"]) > 1000

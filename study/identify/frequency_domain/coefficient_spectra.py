@@ -103,7 +103,7 @@ def coefficient_spectra(fit: FreeRunFit, prepared: Prepared) -> tuple[Coefficien
         for sensor, y in zip(prepared.sensors, prepared.measured.T, strict=True)
     }
     at = next(k for k, (_, where) in enumerate(model.forces) if where in by_sensor)
-    keep = _driven(forces[at], prepared.dt, cut)
+    keep = driven_lines(forces[at], prepared.dt, cut)
     found, row = list[CoefficientSpectrum](), len(forces)
     for place, inputs in groups:
         for item in inputs:
@@ -168,7 +168,8 @@ def _answers(model: Model, place: Place, by_sensor: dict[str, Responses], at: in
     return _Answers(own.response[row], along, own.covariance[:, row, row].real, variance, shared)
 
 
-def _driven(force: Floats, dt: float, cut: Segments) -> Bools:
+def driven_lines(force: Floats, dt: float, cut: Segments) -> Bools:
+    """The lines on which a force of shape (n,) has power."""
     _, power = spectra.autospectrum(force - np.mean(force), dt, cut)
     driven = power > FAINT * float(np.max(power))
     driven[[0, -1]] = False

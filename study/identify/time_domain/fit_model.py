@@ -18,6 +18,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.modal_fit import with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.no_response import (
     LINEAR,
@@ -41,6 +42,7 @@ TRIED = 15  # free runs of a fit that tries a start
 BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
 ASIDE = 1.2  # times the mass of a fit, where another begins that is to come back
 SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
+BESIDE = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
 
@@ -80,7 +82,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     fit = first_fit(known, look) if model.named else _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)
-    ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
+    in_order = tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms)
+    ordered = replace(fit.model, terms=in_order)
     return _followed(settled(continued(replace(fit, model=ordered), prepared), prepared), model, prepared)
 
 
@@ -91,7 +94,7 @@ def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
             f"no free motion of {model.name!r} explains any of {prepared.record.name!r}: as much is left as without "
             "any; expected the record of a decay"
         )
-    if not all(term.name in LINEAR for term in model.terms):
+    if model.modal or not all(term.name in LINEAR for term in model.terms):
         return fit
     omega = driven_at(model, prepared)
     if omega and not _tells_mass(fit, omega, prepared):
@@ -178,6 +181,8 @@ def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) ->
     """
     given = {key: value for key, value in entry.values.items() if value is not None}
     fit, prepared = base.fit, base.prepared
+    if fit.model.modal:
+        return _beside_modes(base, entry, points)
     grown, points = fit.model.with_term(entry), points or shape_search.shape_starts(entry, base)
     starts = (_from_the_equations if base.several else _from_the_free_run)(entry, base, points)
     initial = grown_states(fit, grown) if base.several else None  # which no sensor may show
@@ -189,6 +194,18 @@ def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) ->
             f"no values of {missing} let {entry.name} follow {prepared.record.name}; give them in the model file"
         ) from None
     return replace(from_the_motion(best, prepared), elsewhere=(*best.elsewhere, *fit.elsewhere))
+
+
+def _beside_modes(base: Baseline, entry: ModelTerm, points: Sequence[Start]) -> FreeRunFit:
+    """The same where modes are fitted anew beside the term: from the best point, or also from beside it."""
+    found = points or shape_search.shape_starts(entry, base)
+    if not found:
+        raise StudyError(f"no modes let {entry.name} follow {base.prepared.record.name}; expected an effect that does")
+    best = found[0].parameters
+    near = [best] if points or not best else [tuple(factor * x for x in best) for factor in (1.0, *BESIDE)]
+    given = {key: value for key, value in entry.values.items() if value is not None}
+    shapes = [[x if own is None else own for x, own in zip(p, entry.parameters, strict=True)] for p in near]
+    return with_modal_term(base.fit, entry, shapes, base.prepared, tuple(given))
 
 
 def _from_the_free_run(entry: ModelTerm, base: Baseline, points: Sequence[Start]) -> list[dict[str, float]]:

@@ -3,7 +3,8 @@
 The residual of the model in free run is compared with the response that a small amount of the candidate
 would add (the exact sensitivity at a zero coefficient), less all that the model's own coefficients
 could do. Each point takes one free run; the best few points start a fit of everything. A structure has more
-places than free runs are cheap for: there the equations of all coordinates are asked (``reverse_search``).
+places than free runs are cheap for: there the equations of all coordinates are asked (``reverse_search``), and where
+its linear part is a sum of modes, which has none, modes that are fitted to the lines of the record (``modal_lines``).
 """
 
 from collections.abc import Callable, Sequence
@@ -18,6 +19,7 @@ from study.equations.linear_part import transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import ShapeParameter
+from study.identify.frequency_domain.modal_lines import left_of_lines
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
@@ -66,8 +68,8 @@ class Baseline:
 
     @property
     def several(self) -> bool:
-        """Whether there are several coordinates, and with them places where an effect may sit."""
-        return len(self.fit.model.coordinates) > 1
+        """Whether there are several coordinates, and with them places where an effect may sit, or modes."""
+        return len(self.fit.model.coordinates) > 1 or self.fit.model.modal is not None
 
     def along(self, place: Place, order: int = 0) -> Floats:
         """Relative displacement, or a derivative of it, at a place, shape (n,)."""
@@ -93,6 +95,11 @@ class Baseline:
     def reverse(self) -> EquationsAlongMotion:
         """What the equations of all coordinates leave along the measured motion."""
         return equations_along_motion(self)
+
+    @cached_property
+    def beside_modes(self) -> float:
+        """What as many modes as the fit has leave of the lines of the record, beside the terms of the model."""
+        return left_of_lines(self.fit.model, self.prepared)
 
 
 @dataclass(frozen=True)
@@ -124,7 +131,8 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     motions = tuple(Sensor(c, m) for m in MOTIONS for c in fit.model.coordinates)
     free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
-    linear, approximation = ({}, {}) if len(fit.model.coordinates) > 1 else _linear(fit, prepared)
+    several = len(fit.model.coordinates) > 1 or fit.model.modal
+    linear, approximation = ({}, {}) if several else _linear(fit, prepared)
     return Baseline(fit, prepared, basis, motion, linear, approximation)
 
 
@@ -147,6 +155,8 @@ def shape_starts(entry: ModelTerm, base: Baseline) -> list[Start]:
     A single mass is asked by the sensitivities of its free run, one run a point. Where there are several places a free
     run each is too much, and the reverse system is asked.
     """
+    if base.fit.model.modal:
+        return _along_lines(entry, base)
     if base.several:
         u = base.reverse.record(entry.place)["displacement"]
         found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
@@ -158,6 +168,18 @@ def shape_starts(entry: ModelTerm, base: Baseline) -> list[Start]:
         return best[:STARTS]
     step = max(1, (len(tried) - 1) // (SPREAD - 1))
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
+
+
+def _along_lines(entry: ModelTerm, base: Baseline) -> list[Start]:
+    """The points for a candidate beside modes, by the share that it explains of what these leave of the lines."""
+    model, record = base.fit.model, base.prepared.record
+    measured = np.stack([record.motion(c)[0] for c in model.coordinates], axis=1)[slice(*base.prepared.plan.fit)]
+    found: list[Start] = []
+    for point in points_to_try(entry, measured @ np.array(entry.place.direction(model.coordinates)), base):
+        left = left_of_lines(model.with_term(replace(entry, parameters=point)), base.prepared)
+        if np.isfinite(left):
+            found.append(Start(point, (), 1.0 - left / base.beside_modes))
+    return sorted(found, key=lambda s: -s.share)
 
 
 def sensitivity(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline) -> Floats | None:

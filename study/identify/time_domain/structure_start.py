@@ -36,7 +36,7 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
         If no fit begins.
     """
     if model.modal:
-        return modal_fit(model, prepared)
+        return modal_fit(model, prepared)  # as many modes as the record shows
     linear = known_linear(model, prepared)
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
