@@ -12,7 +12,7 @@ between two coordinates is in both equations, with opposite signs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -245,7 +245,7 @@ def _forces(model: Model, keys: Sequence[str], motion: Floats, part: Record) -> 
     for entry in model.states:
         item = next(item for item in placed_inputs(entry) if item.state is not None)
         along = motion @ np.array(entry.place.direction(model.coordinates))
-        columns[f"z:{entry.name}"] = input_history(item, replace(part.relative(along), stretches=part.stretches))
+        columns[f"z:{entry.name}"] = input_history(item, part.relative(along))
     made = kernels.evaluate(acceleration_program(model, keys), columns | {"t": part.time}, n)
     left = made.reshape(n, len(model.coordinates), 1 + len(keys))
     left[:, :, 0] -= motion[2]

@@ -29,9 +29,8 @@ class Equations:
     def __init__(self, model: Model, accelerated: bool = False) -> None:
         graph = self.graph = Graph()
         self.model, modal = model, model.modal
-        masses = {e.place.ends[0] for e in model.terms if e.term.name == "inertia" and e.place.kind == "at"}
-        self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in masses)
-        self.free = () if modal else tuple(c for c in model.coordinates if c in masses)
+        self.free = () if modal else model.inertial
+        self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in self.free)
         forces = [(name, where) for name, where in model.forces if where not in self.prescribed]
         driven, moving = set(self.prescribed), set(self.free)
         for entry in model.terms:  # a mass that is tied to a prescribed motion, or friction that may hold one

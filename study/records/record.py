@@ -190,7 +190,8 @@ class Record:
         first, last = span or (0, len(self))
         further = {name: self[name][first:last] for name in self.extra}
         channels = {"force": np.zeros(last - first), **dict(zip(MOTIONS, motion, strict=False)), **further}
-        return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt)
+        stretches = self.stretches if span is None else ()
+        return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt, stretches=stretches)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
         changed = self.changed.union(channels) if self.stretches else self.changed

@@ -6,29 +6,22 @@ from contextlib import suppress
 import numpy as np
 
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import linear_keys
 from study.equations.model import Model
-from study.identify.frequency_domain.linear_start import lumped_start
-from study.identify.time_domain.free_decay import free_decay_start
+from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit
+from study.identify.time_domain.motion_start import motion_start, seen_everywhere
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
-from study.support.errors import DivergenceError, expect
-
-
-def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
-    """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
-    held = {key: value for key, value in model.values.items() if value is not None}
-    start = free_decay_start if prepared.free else lumped_start
-    return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
+from study.support.errors import DivergenceError, StudyError, expect
 
 
 def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """Fit all that a structure leaves open; what it gives is held.
 
-    From the linear terms alone, and where that diverges or stays far from the motion, with more damping.
+    From the linear terms alone, and where that diverges or stays far from the motion, with more damping, and from what
+    the equations say along the measured motion.
 
     Raises
     ------
@@ -37,19 +30,28 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """
     if model.modal:
         return modal_fit(model, prepared)
-    linear = known_linear(model, prepared)
-    open_keys = [key for key, value in model.values.items() if value is None]
-    start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
+    linear = linear_start(model, prepared)
+    start = {key: linear[key] for key, value in model.values.items() if value is None}
     fits: list[FreeRunFit] = []
     with suppress(DivergenceError):
         fits.append(_begun(model, prepared, start))
     if not fits or (not fits[0].converged and 2.0 * fits[0].rms ** 2 > prepared.spread**2):
         calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
-        try:
-            fits.append(_begun(model, prepared, calm))
-        except DivergenceError:
-            expect(fits, _endless(model, prepared))
+        for other in (calm, _along_the_motion(model, prepared)):
+            with suppress(DivergenceError):
+                fits += [_begun(model, prepared, other)] if other else []
+        expect(fits, _endless(model, prepared))
     return min(fits, key=lambda fit: fit.rms)
+
+
+def _along_the_motion(model: Model, prepared: Prepared) -> dict[str, float]:
+    """A start from all equations along the measured motion; empty where that is not known, or says nothing."""
+    if not seen_everywhere(model, prepared) or prepared.free or any(None in entry.parameters for entry in model.terms):
+        return {}
+    try:
+        return motion_start(model, prepared, model.held_keys)
+    except StudyError:
+        return {}
 
 
 def _begun(model: Model, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit:
