@@ -30,6 +30,7 @@ from study.equations.model import Model, named_channels
 from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.starting_values import oscillator
+from study.identify.time_domain.told_alone import is_alone, prepared_alone
 from study.records.completion import SETTLED, derivative
 from study.records.noise_floor import CLEAR, SMOOTH
 from study.records.prepared import FORCE, Prepared
@@ -258,10 +259,10 @@ def _stiffness(model: Model, prepared: Prepared, frequency: Floats) -> Complexes
 
     Of a single mass that of the best linear oscillator, whose resonance is never sharper than the least damping.
     """
-    if model.named:
+    if model.named and not is_alone(model):
         stiffness, damping, mass = matrices(model, model.numbers())
     else:
-        own = oscillator(prepared)
+        own = oscillator(prepared_alone(prepared) if model.named else prepared)
         least = 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"]))
         stiffness, damping, mass = (np.array([[x]]) for x in (own["k"], max(abs(own["c"]), least), own["m"]))
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])[:, None, None]

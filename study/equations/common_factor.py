@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from study.equations.model import Model
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import Prepared
+from study.records.record import FORCE, MOTIONS, Sensor
 from study.support.errors import expect
 
 SAID = (
@@ -14,12 +17,23 @@ SAID = (
 
 def per_unit_mass(model: Model, prepared: Prepared) -> tuple[Model, Prepared]:
     """A model and a record of free decays with a mass of one, unless the model gives a coefficient."""
-    symbols = [s for t in model.terms for s in t.term.symbols]
-    if "m" not in model.values or any(model.values[s] is not None for s in symbols):
+    symbols, mass = [s for t in model.terms for s in t.symbols], _mass(model)
+    if len(model.coordinates) > 1 or mass is None or any(model.values[s] is not None for s in symbols):
         return model, prepared
-    units = {**prepared.record.units, FORCE: f"{prepared.record.units['displacement']}/s^2"}
-    record = replace(prepared.record, units=units)
-    return model.with_values({"m": 1.0}), replace(prepared, record=record, notes=(*prepared.notes, SAID))
+    record = prepared.record
+    forces = list(record.forces) or [FORCE]
+    per_mass = f"{record.unit(Sensor(record.coordinates[0], MOTIONS[0]))}/s^2"
+    still = {force: np.zeros(len(record)) for force in forces if force not in record}
+    record = replace(
+        record, channels={**record.channels, **still}, forces=tuple(forces),
+        units={**record.units, **dict.fromkeys(forces, per_mass)},
+    )  # fmt: skip
+    return model.with_values({mass: 1.0}), replace(prepared, record=record, notes=(*prepared.notes, SAID))
+
+
+def _mass(model: Model) -> str | None:
+    """The key of the only mass, or of the first."""
+    return next((t.symbols[0] for t in model.terms if t.term.name == "inertia"), None)
 
 
 def with_known_mass(model: Model) -> Model:

@@ -51,12 +51,11 @@ def made_ready(
     model, records, said = driven_alike(records, model, absolute)
     prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
     drifts = not (prescribed or model.modal or has_spring(model))
-    prepared = laid_out(
-        records, layout, KindOfTest(prescribed, drifts, model.modal is not None, ANEW if model.named else 0.0)
-    )
+    anew = ANEW if len(model.coordinates) > 1 else 0.0
+    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew))
     lacks = _unseen(model, prepared)
     prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
-    return per_unit_mass(model, prepared) if prepared.free and not model.named else (model, prepared)
+    return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 
 
 def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.free_decay import free_decay_start
+from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -115,6 +116,9 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
 
     Those that a structure holds are as it has them.
     """
+    if is_alone(model):
+        alone = linear_start(model_alone(model), prepared_alone(prepared))
+        return dict(zip(model.values, alone.values(), strict=True))
     if model.named:
         given = {key: value for key, value in model.values.items() if value is not None}
         start = free_decay_start if prepared.free else lumped_start

@@ -54,8 +54,6 @@ def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def motion_start(model: Model, prepared: Prepared, held: tuple[str, ...]) -> dict[str, float]:
     """Coefficients by least squares of all equations along the measured motion; what is held stays.
 
-    An equation counts as the power of its forces does, which has one unit for translations and rotations.
-
     Raises
     ------
     StudyError
@@ -66,18 +64,16 @@ def motion_start(model: Model, prepared: Prepared, held: tuple[str, ...]) -> dic
     known = [(model.values[s] or 0.0) * forces[s] for s in forces if s in held]
     target = np.sum([_driving(model, part), *(-force for force in known)], axis=0)
     wanted = [s for s in forces if s not in held]
-    speed = np.array([float(np.std(part.motion(c)[1])) for c in model.coordinates])
-    lines = _below_the_noise(np.stack([*(forces[s] for s in wanted), target], axis=2), model, part)
-    rows = (lines * (speed / np.max(speed))[:, None]).reshape(-1, len(wanted) + 1)
-    both = np.concatenate([rows.real, rows.imag])
+    lines = _as_power(np.stack([*(forces[s] for s in wanted), target], axis=2), model, part)
+    both = np.concatenate([lines.real, lines.imag]).reshape(-1, len(wanted) + 1)
     found = least_squares(both[:, :-1], both[:, -1], 1e-9)
     return dict(zip(wanted, found.tolist(), strict=True))
 
 
 def delay_along_the_motion(model: Model, prepared: Prepared) -> float:
-    """Samples by which the response of a mass seems to be late; nan where no delay within reach explains most.
+    """Samples by which all motions seem to be late; nan where no delay within reach lets the terms explain most.
 
-    Least squares of the force on the forces of all terms along the motion, the force as late as the motion, asks for no
+    Least squares of the forces on those of all terms along the motion, the former as late as the motion, asks for no
     free run, which a record that is late by a part of a period sends to a minimum of its own. Noise and missing effects
     move it: a start.
 
@@ -87,13 +83,13 @@ def delay_along_the_motion(model: Model, prepared: Prepared) -> float:
         If a shape parameter is not known, or a force has no finite value somewhere along the motion.
     """
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
-    forces = np.stack([*_unit_forces(model, part).values(), _driving(model, part)], axis=2)
-    lines = _below_the_noise(forces, model, part)[:, 0]
-    both = np.concatenate([lines[:, :-1].real, lines[:, :-1].imag])
+    lines = _as_power(np.stack([*_unit_forces(model, part).values(), _driving(model, part)], axis=2), model, part)
+    both = np.concatenate([lines[..., :-1].real, lines[..., :-1].imag]).reshape(-1, lines.shape[2] - 1)
     basis = np.linalg.qr(both / np.maximum(np.linalg.norm(both, axis=0), np.finfo(float).tiny))[0]
     late = np.arange(-REACH, REACH + STEP, STEP)
-    turned = lines[:, -1:] * np.exp(-2j * np.pi * np.arange(len(lines))[:, None] / len(part) * late)
-    explained = np.sum((basis.T @ np.concatenate([turned.real, turned.imag])) ** 2, axis=0)
+    turned = lines[..., -1:] * np.exp(-2j * np.pi * np.arange(len(lines))[:, None, None] / len(part) * late)
+    turned = np.concatenate([turned.real, turned.imag]).reshape(-1, len(late))
+    explained = np.sum((basis.T @ turned) ** 2, axis=0)
     most = int(np.argmax(explained))
     return float(late[most]) if 0 < most < len(late) - 1 else float("nan")
 
@@ -119,11 +115,12 @@ def _driving(model: Model, part: Record) -> Floats:
     return total
 
 
-def _below_the_noise(forces: Floats, model: Model, part: Record) -> Complexes:
+def _as_power(forces: Floats, model: Model, part: Record) -> Complexes:
     """Spectra of forces, passed where those that drive do work and less and less above, shape (lines, coordinates, q).
 
-    Above, an acceleration is noise that grows with the square of frequency, and falls so behind the filter. A window
-    and a filter leave the balance of the forces as it is.
+    Each counts as its power on the motion, which has one unit for translations and rotations. Above, an acceleration is
+    noise that grows with the square of frequency, and falls so behind the filter. A window and a filter leave the
+    balance of the forces as it is.
     """
     window = np.hanning(len(forces))
     spectra = np.asarray(rfft(window[:, None, None] * forces, axis=0), dtype=np.complex128)
@@ -132,7 +129,8 @@ def _below_the_noise(forces: Floats, model: Model, part: Record) -> Complexes:
     work = np.sum(np.abs(rfft(driving, axis=0) * rfft(window[:, None] * velocity, axis=0)), axis=1)
     lines = np.arange(len(work))
     passed = 1.0 + (lines / float(np.average(lines, weights=work))) ** 2
-    return spectra / (passed**2)[:, None, None]
+    speed = np.std(velocity, axis=0)
+    return spectra * (speed / np.max(speed))[:, None] / (passed**2)[:, None, None]
 
 
 def _of_order(item: Input, shape: Floats, order: int, motion: Record) -> Floats:

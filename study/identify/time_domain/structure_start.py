@@ -10,18 +10,16 @@ from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit
-from study.identify.time_domain.motion_start import motion_start, seen_everywhere
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
-from study.support.errors import DivergenceError, StudyError, expect
+from study.support.errors import DivergenceError, expect
 
 
 def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """Fit all that a structure leaves open; what it gives is held.
 
-    From the linear terms alone, and where that diverges or stays far from the motion, with more damping, and from what
-    the equations say along the measured motion.
+    From the linear terms alone, and where that diverges or stays far from the motion, with more damping.
 
     Raises
     ------
@@ -37,21 +35,11 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
         fits.append(_begun(model, prepared, start))
     if not fits or (not fits[0].converged and 2.0 * fits[0].rms ** 2 > prepared.spread**2):
         calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
-        for other in (calm, _along_the_motion(model, prepared)):
-            with suppress(DivergenceError):
-                fits += [_begun(model, prepared, other)] if other else []
-        expect(fits, _endless(model, prepared))
+        try:
+            fits.append(_begun(model, prepared, calm))
+        except DivergenceError:
+            expect(fits, _endless(model, prepared))
     return min(fits, key=lambda fit: fit.rms)
-
-
-def _along_the_motion(model: Model, prepared: Prepared) -> dict[str, float]:
-    """A start from all equations along the measured motion; empty where that is not known, or says nothing."""
-    if not seen_everywhere(model, prepared) or prepared.free or any(None in entry.parameters for entry in model.terms):
-        return {}
-    try:
-        return motion_start(model, prepared, model.held_keys)
-    except StudyError:
-        return {}
 
 
 def _begun(model: Model, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit:
