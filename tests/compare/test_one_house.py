@@ -55,10 +55,18 @@ def let_go() -> Record:
     return Record(DT, {"force": still, "displacement": u + 0.002 * np.std(u) * rng.standard_normal(N)}, name="decay")
 
 
+def on_a_table() -> Record:
+    """The force of a base of which the acceleration was measured."""
+    record = shaken()
+    still = {"force": np.zeros(N), "base_acceleration": -record["force"]}
+    return record.with_channels(still)
+
+
 def named(record: Record) -> Record:
     """The same record with other names of its channels."""
     drive = {"shaker": record["force"]} if np.any(record["force"]) else {}
-    return record_of(DT, drive, {Sensor("x", "displacement"): record["displacement"]}, name=record.name)
+    base = {name: values for name, values in record.channels.items() if name.startswith("base_")}
+    return record_of(DT, drive, {Sensor("x", "displacement"): record["displacement"]}, base, name=record.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +92,7 @@ PLAIN = FaultSettings(switched_off=("delay",))
 CASES = {
     "driven": lambda: told([shaken()], PLAIN),
     "early": lambda: told([early(2)]),
+    "base": lambda: told([on_a_table()], PLAIN),
     "decay": lambda: told([let_go()]),
     "several": lambda: told([shaken(), shaken(0.3, seed=7)]),
 }

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from study.equations.linear_part import acting
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, Settings, named_parameters
 from study.identify.estimators.in_reverse import identify_lines
@@ -116,7 +117,9 @@ def _equation(
     cache: dict[tuple[float, ...], Record],
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
-    drives = [record[name] for name, where in model.forces if where == coordinate and np.any(record[name])]
+    own = acting(model)[model.coordinates.index(coordinate)]
+    pairs = zip(own, model.forces, strict=True)
+    drives = [unit * record[name] for unit, (name, _) in pairs if unit != 0.0 and np.any(record[name])]
     output = np.sum(drives, axis=0) if drives else -prepared.record.motion(coordinate)[INERTIA]
     if not drives:
         mass = next(

@@ -7,6 +7,7 @@ noise on the motion biases it. So it is where multiple shooting begins, and the 
 import numpy as np
 from scipy.fft import rfft
 
+from study.equations.linear_part import acting
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input, along, histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -109,10 +110,7 @@ def _unit_forces(model: Model, part: Record) -> dict[str, Floats]:
 
 def _driving(model: Model, part: Record) -> Floats:
     """The measured force on each coordinate, shape (n, coordinates)."""
-    total = np.zeros((len(part), len(model.coordinates)))
-    for name, where in model.forces:
-        total[:, model.coordinates.index(where)] += part[name]
-    return total
+    return part.columns([name for name, _ in model.forces]) @ acting(model).T
 
 
 def _as_power(forces: Floats, model: Model, part: Record) -> Complexes:
