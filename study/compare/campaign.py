@@ -11,6 +11,7 @@ from typing import Any
 
 from study.compare import across_levels
 from study.compare.fitted_coefficients import Coefficient
+from study.equations.place import Kind, Place, place_in_words
 from study.figures.labels import prefixed, term_names
 from study.support import document
 from study.support.numbers import percent
@@ -103,13 +104,23 @@ def _verdict(record: Measured) -> tuple[str, ...]:
     verdict = str(found["verdict"])
     missing = verdict == "missing_effect"
     first: Mapping[str, Any] = found["candidates"][0] if found["candidates"] and missing else {}
-    effects = " or ".join(term_names(name) for name in (first["term"], *first.get("tied_with", ()))) if first else ""
+    effects = " or ".join(map(_effect, (first, *first.get("tied_with", ())))) if first else ""
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
         percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
         effects, percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip
+
+
+def _effect(told: str | Mapping[str, Any]) -> str:
+    """An effect in words, with its place where that has a name."""
+    if isinstance(told, str):
+        return term_names(told)
+    kinds: tuple[Kind, ...] = ("at", "between", "couples")
+    ends = [(kind, told[kind]) for kind in kinds if kind in told]
+    where = [Place(kind, (end,) if isinstance(end, str) else tuple(end)) for kind, end in ends]
+    return " ".join((term_names(told["term"]), *map(place_in_words, where)))
 
 
 def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:

@@ -15,7 +15,7 @@ there the missing force of a place is what makes, through them, most of what the
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,7 @@ from study.identify.frequency_domain.coefficient_spectra import driven_lines
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.modal_lines import unit_forces
 from study.identify.frequency_domain.starting_values import oscillator
+from study.identify.time_domain.told_alone import is_alone, prepared_alone
 from study.records.completion import SETTLED, derivative
 from study.records.noise_floor import CLEAR, SMOOTH
 from study.records.prepared import FORCE, Prepared
@@ -336,7 +337,7 @@ def _forces(model: Model, keys: Sequence[str], motion: Floats, part: Record) -> 
     for entry in model.states:
         item = next(item for item in placed_inputs(entry) if item.state is not None)
         along = motion @ np.array(entry.place.direction(model.coordinates))
-        columns[f"z:{entry.name}"] = input_history(item, replace(part.relative(along), stretches=part.stretches))
+        columns[f"z:{entry.name}"] = input_history(item, part.relative(along))
     made = kernels.evaluate(acceleration_program(model, keys), columns | {"t": part.time}, n)
     left = made.reshape(n, len(model.coordinates), 1 + len(keys))
     left[:, :, 0] -= motion[2]
@@ -349,10 +350,10 @@ def _stiffness(model: Model, prepared: Prepared, frequency: Floats) -> Complexes
 
     Of a single mass that of the best linear oscillator, whose resonance is never sharper than the least damping.
     """
-    if model.named:
+    if model.named and not is_alone(model):
         stiffness, damping, mass = matrices(model, model.numbers())
     else:
-        own = oscillator(prepared)
+        own = oscillator(prepared_alone(prepared) if model.named else prepared)
         least = 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"]))
         stiffness, damping, mass = (np.array([[x]]) for x in (own["k"], max(abs(own["c"]), least), own["m"]))
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])[:, None, None]

@@ -18,7 +18,7 @@ from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm
-from study.equations.place import Place
+from study.equations.place import GROUND, Place
 from study.equations.term import Component
 from study.records.record import MOTIONS, Sensor
 
@@ -29,9 +29,8 @@ class Equations:
     def __init__(self, model: Model, accelerated: bool = False) -> None:
         graph = self.graph = Graph()
         self.model, modal = model, model.modal
-        masses = {e.place.ends[0] for e in model.terms if e.term.name == "inertia" and e.place.kind == "at"}
-        self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in masses)
-        self.free = () if modal else tuple(c for c in model.coordinates if c in masses)
+        self.free = () if modal else model.inertial
+        self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in self.free)
         forces = [(name, where) for name, where in model.forces if where not in self.prescribed]
         driven, moving = set(self.prescribed), set(self.free)
         for entry in model.terms:  # a mass that is tied to a prescribed motion, or friction that may hold one
@@ -128,7 +127,12 @@ class Equations:
         graph, (against, loads, rates) = self.graph, self._terms
         loads = dict(loads)
         for where, node in self.forces:
-            loads[where] = graph.add(loads[where], node)
+            if where != GROUND:
+                loads[where] = graph.add(loads[where], node)
+                continue
+            for i, _, weight, key in mass_entries(self.model):  # it moves, and inertia stays behind
+                coordinate, inertia = self.model.coordinates[i], graph.mul(self.values[key], node)
+                loads[coordinate] = (graph.sub if weight > 0.0 else graph.add)(loads[coordinate], inertia)
         loads = {c: graph.sub(load, against[c]) for c, load in loads.items()}  # summed first, subtracted once
         if self.model.modal is not None:
             return [*self._modal(self.model.modal, loads), *rates]

@@ -59,6 +59,20 @@ def matrices(model: Model, values: Mapping[str, float]) -> Floats:
     return total
 
 
+def acting(model: Model) -> Floats:
+    """What a unit of each measured force is in each equation, shape (coordinates, forces).
+
+    The acceleration of the ground acts through the masses, which are all known then, on motions relative to it.
+    """
+    each = [np.array([float(c == where) for c in model.coordinates]) for _, where in model.forces]
+    if all(where != GROUND for _, where in model.forces):
+        return np.stack(each, axis=1) if each else np.zeros((len(model.coordinates), 0))
+    mass = matrices(model, {key: value or 0.0 for key, value in model.values.items()})[2]
+    of_ground = -np.sum(mass, axis=1)
+    pairs = zip(each, model.forces, strict=True)
+    return np.stack([of_ground if where == GROUND else own for own, (_, where) in pairs], axis=1)
+
+
 def shapes_of(model: Model, values: Mapping[str, float]) -> Floats:
     """T of ``u = T q``, shape (coordinates, degrees of freedom)."""
     if model.modal is None:

@@ -96,6 +96,12 @@ class Model:
         return self.coordinates != (ALONE,)
 
     @property
+    def inertial(self) -> tuple[str, ...]:
+        """The coordinates with inertia, which are degrees of freedom; the motion of others is prescribed."""
+        at = {e.place.ends[0] for e in self.terms if e.term.name == "inertia" and e.place.kind == "at"}
+        return tuple(c for c in self.coordinates if c in at)
+
+    @property
     def values(self) -> dict[str, float | None]:
         """Every coefficient and shape parameter by key, then every number of its modes."""
         own = {key: value for t in self.terms for key, value in t.values.items()}

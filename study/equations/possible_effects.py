@@ -28,6 +28,6 @@ def candidate_entries(
             straight = any(end not in turning for end in place.moving)
             if (term.name, place.path) not in known and not (term.angle and straight):
                 found.append(free(term, place))
-                if place.kind == "between" and not outside and one_sided(term):
+                if len(model.coordinates) > 1 and place.kind == "between" and not outside and one_sided(term):
                     found.append(free(term, Place("between", place.ends[::-1])))
     return found

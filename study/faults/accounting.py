@@ -12,7 +12,7 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected, fault_columns, unit_of
-from study.faults.fault import DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault, Held
+from study.faults.fault import ALL_SENSORS, DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault, Held
 from study.faults.force_noise import force_noise
 from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover
 from study.faults.search import (
@@ -30,7 +30,7 @@ from study.faults.search import (
 from study.faults.seen_in_residual import mean_response, slow_response
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.motion_start import delay_along_the_motion, has_lost_the_motion
+from study.identify.time_domain.motion_start import delay_along_the_motion, has_lost_the_motion, seen_everywhere
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import FORCE, Prepared
@@ -201,17 +201,10 @@ def _late_response(
     if not channels or (fit is not None and not is_poor(fit, needed(plain).fitted)):
         return None
     try:
-        if model.named:
-            found = _best_late(model, prepared, fit, faults, channels, needed)
-            if found is None:
-                return None
-            begin, begun = found
-        else:
-            late = math.nan if fit is None else delay_along_the_motion(fit.model, plain)
-            if not abs(late) > 0.0:
-                return None
-            begin = Fault(DELAY, channels[0], late, unit=unit_of(DELAY, ""))
-            begun = fit_model(model, needed(corrected(prepared, (*faults, begin))))
+        found = _best_late(model, prepared, fit, faults, channels, needed)
+        if found is None:
+            return None
+        begin, begun = found
         follows = fit is None or fit.restarts or begun.rms < fit.rms  # segments follow anything, by their own states
         if begun.restarts or not follows:
             return None
@@ -232,18 +225,27 @@ def _best_late(
     model: Model, prepared: Prepared, fit: FreeRunFit | None, faults: Sequence[Fault], channels: Sequence[str],
     needed: Callable[[Prepared], Prepared],
 ) -> tuple[Fault, FreeRunFit] | None:  # fmt: skip
-    """Of a structure that has lost the motion, or has no finite one, the delay of a channel with which it follows best.
+    """The delay with which a model follows best: of all motions, as their equations show it along what was measured.
 
-    A model that lacks an effect is poor too, but follows the motion: then a delay shows in what it leaves.
+    Of a structure that has lost the motion, or has no finite one, that of any channel. A model that lacks an effect is
+    poor too, but follows the motion: then a delay shows in what it leaves.
     """
-    if fit is not None and fit.converged and not has_lost_the_motion(fit, needed(corrected(prepared, faults))):
-        return None
+    plain = corrected(prepared, faults)
+    several, lost = (
+        len(model.coordinates) > 1,
+        fit is None or not fit.converged or has_lost_the_motion(fit, needed(plain)),
+    )
+    seen, all_motions = fit is not None and seen_everywhere(model, prepared), ALL_SENSORS if several else channels[0]
+    late = (
+        delay_along_the_motion(fit.model, plain) if seen and fit is not None and all_motions in channels else math.nan
+    )
+    asked = [(all_motions, late)] if abs(late) > 0.0 else []
+    asked += [(channel, late) for channel in channels for late in FAR_APART] if several and lost else []
     tried: list[tuple[Fault, FreeRunFit]] = []
-    for channel in channels:
-        for late in FAR_APART:
-            begin = Fault(DELAY, channel, late, unit=unit_of(DELAY, ""))
-            with suppress(StudyError):
-                tried.append((begin, fit_model(model, needed(corrected(prepared, (*faults, begin))))))
+    for channel, late in asked:
+        begin = Fault(DELAY, channel, late, unit=unit_of(DELAY, ""))
+        with suppress(StudyError):
+            tried.append((begin, fit_model(model, needed(corrected(prepared, (*faults, begin))))))
     return min(tried, key=lambda one: one[1].rms, default=None)
 
 

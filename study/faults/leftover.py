@@ -353,8 +353,6 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
-    if fit.model.named and len(fit.model.coordinates) == 1:  # the search knows one coordinate without a name alone
-        return None
     look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
     entries = candidate_entries(fit.model, turning=prepared.record.rotations)
     try:

@@ -217,7 +217,8 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
         own = "rad" if sensor.coordinate in turning else length
         wanted[str(sensor)] = (own, f"{own}/s", f"{own}/s^2")[MOTIONS.index(sensor.motion)]
     if record.coordinates != (ALONE,):
-        forces = {name: role_unit("force", record.unit(name)) for name in record.forces}
+        per_mass = [f for f in record.forces if parse_unit(record.unit(f)).powers == ROLES["acceleration"][0]]
+        forces = {name: role_unit("force", record.unit(name)) for name in record.forces if name not in per_mass}
         first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
         units |= forces
         for name, u in forces.items():

@@ -12,7 +12,7 @@ import numpy as np
 
 from study.records.completion import consistent, derivative
 from study.records.noise_floor import floor
-from study.records.record import MOTIONS, SI_UNITS, Record
+from study.records.record import FORCE, MOTIONS, OF_THE_GROUND, SI_UNITS, Record
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, at, expect
@@ -29,11 +29,13 @@ DIGITAL = 0.95  # of all changes that are whole steps: then a displacement is di
 
 def on_a_moving_base(record: Record) -> bool:
     """Whether the base was measured and no force."""
-    return not np.any(record["force"]) and any(channel in record for channel in BASE)
+    return record.unforced and any(channel in record for channel in BASE)
 
 
 def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tuple[Record, tuple[str, ...]]:
     """The record with the force of the base, and motions relative to it; and sentences on that.
+
+    Of several coordinates the base's acceleration stands for the force, which each mass makes of it.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tupl
         Whether the response was measured absolutely: the base's own motion is then subtracted.
     """
     record, notes = consistent(record)
-    length = record.units["displacement"]
+    length = record.force_and_length[1]
     base = dict[str, Floats]()
     for motion, wanted in zip(MOTIONS, (length, f"{length}/s", f"{length}/s^2"), strict=True):
         if (channel := f"base_{motion}") in record:
@@ -58,21 +60,25 @@ def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tupl
     order = MOTIONS.index("acceleration") - MOTIONS.index(known)
     acceleration = base[known] if order == 0 else derivative(base[known], record.dt, order)
     base["acceleration"] = acceleration
-    channels = {"force": -(1.0 if mass is None else mass) * acceleration}
+    driving, channels = FORCE, {FORCE: -(1.0 if mass is None else mass) * acceleration}
     said = [*notes, SAID if mass is not None else f"{SAID}, and {PER_MASS}"]
     if absolute:
-        for motion in (m for m in MOTIONS if m in record):
-            if motion not in base:
+        for sensor in record.sensors:
+            if (motion := sensor.motion) not in base:
                 raise StudyError(
                     f"{record.name}: the {motion} is absolute and the base's was not measured; expected a column "
                     f"base_{motion}, or the response relative to the base"
                 )
-            channels[motion] = record[motion] - base[motion]
+            channels[str(sensor)] = record[sensor] - base[motion]
         said.append("the response is taken relative to the base")
     unit = f"{length}/s^2" if mass is None else "N" if length == "m" else f"kg {length}/s^2"
-    kept = {c: v for c, v in record.channels.items() if c not in BASE}
-    units = {**record.units, "force": unit}
-    return replace(record, channels={**kept, **channels}, units=units), tuple(said)
+    kept = {c: v for c, v in record.channels.items() if c not in (*BASE, *record.forces)}
+    if len(record.coordinates) > 1:
+        driving, unit = OF_THE_GROUND, f"{length}/s^2"
+        channels[driving] = acceleration
+        del channels[FORCE]
+    units = {**record.units, driving: unit}
+    return replace(record, channels={**kept, **channels}, units=units, forces=(driving,)), tuple(said)
 
 
 def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:

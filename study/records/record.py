@@ -13,6 +13,7 @@ from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
 MOTIONS = ("displacement", "velocity", "acceleration")
+OF_THE_GROUND = "base_acceleration"  # stands for a force where the base of a structure moves
 FORCE = "force"  # on a single mass; what is predicted where the motion is prescribed
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
@@ -126,9 +127,11 @@ class Record:
     @property
     def force_and_length(self) -> tuple[str, str]:
         """Units of force and length in the equations of motion of coordinates that do not turn."""
-        forces = (self.unit(f) for f in self.forces if " " not in self.unit(f))  # else a moment
+        forces = (self.unit(f) for f in self.forces if " " not in self.unit(f) and f != OF_THE_GROUND)  # else a moment
         lengths = (self.units.get(str(Sensor(c, MOTIONS[0])), "") for c in self.coordinates if c not in self.rotations)
-        return next(forces, SI_UNITS["force"]), next(filter(None, lengths), SI_UNITS["displacement"])
+        length = next(filter(None, lengths), SI_UNITS["displacement"])
+        usual = SI_UNITS["force"] if length == SI_UNITS["displacement"] else f"kg {length}/s^2"
+        return next(forces, usual if OF_THE_GROUND in self.forces else SI_UNITS["force"]), length
 
     @property
     def time(self) -> Floats:
@@ -190,7 +193,8 @@ class Record:
         first, last = span or (0, len(self))
         further = {name: self[name][first:last] for name in self.extra}
         channels = {"force": np.zeros(last - first), **dict(zip(MOTIONS, motion, strict=False)), **further}
-        return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt)
+        stretches = self.stretches if span is None else ()
+        return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt, stretches=stretches)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
         changed = self.changed.union(channels) if self.stretches else self.changed

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from study.compare.by_estimator import FREE_RUN
 from study.compare.running_on import has_lost_its_way
-from study.equations.common_factor import per_unit_mass, with_known_mass
+from study.equations.common_factor import on_moving_ground, per_unit_mass
 from study.equations.equations_of_motion import has_spring
 from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
@@ -47,16 +47,14 @@ def made_ready(
         If the records, or the model and such a test, do not go together; of a structure, if nothing measures a
         coordinate or ties it to another, or its masses are not positive definite together.
     """
-    expect(not (absolute and model.named), "--absolute is for a single mass; expected it left out beside 'coordinates'")
     model, records, said = driven_alike(records, model, absolute)
     prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
     drifts = not (prescribed or model.modal or has_spring(model))
-    prepared = laid_out(
-        records, layout, KindOfTest(prescribed, drifts, model.modal is not None, ANEW if model.named else 0.0)
-    )
+    anew = ANEW if len(model.coordinates) > 1 else 0.0
+    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew))
     lacks = _unseen(model, prepared)
     prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
-    return per_unit_mass(model, prepared) if prepared.free and not model.named else (model, prepared)
+    return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 
 
 def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
@@ -89,10 +87,21 @@ def driven_alike(
 
     All other records are as they were. Raises as :func:`made_ready`.
     """
-    based = [not model.named and on_a_moving_base(record) for record in records]
+    based = [model.modal is None and on_a_moving_base(record) for record in records]
+    bare = (
+        "--absolute is for a moving base under a model that is not modal; expected a column base_acceleration, no force"
+    )
+    expect(any(based) or not (absolute and model.named), bare)
     if any(based):
-        model = with_known_mass(model)
-    mass = None if model.values.get("m") == 1.0 else model.values.get("m")
+        same = all(based) or not model.named
+        expect(same, "a base moves in some of these records and a force acts in others; expected one of both")
+        turning = ", ".join(sorted(records[0].rotations))
+        expect(
+            not turning, f"the base moves and {turning} turns; expected coordinates that all move along with the base"
+        )
+        model = on_moving_ground(model)
+    mass = next((model.values[s] for t in model.terms if t.term.name == "inertia" for s in t.symbols), None)
+    mass = None if mass == 1.0 and len(model.coordinates) == 1 else mass
     moved = [relative_to_base(r, mass, absolute) if b else (r, ()) for r, b in zip(records, based, strict=True)]
     return model, [record for record, _ in moved], tuple(note for _, said in moved for note in said)
 

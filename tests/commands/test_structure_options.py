@@ -105,7 +105,7 @@ def test_a_record_in_millimetres_stays_in_millimetres(folder):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (("--absolute",), "--absolute is for a single mass"),
+    (("--absolute",), "--absolute is for a moving base"),
     (("--estimator", "local_polynomial"), "--estimator local_polynomial is for a single mass"),
     (("--each-record", "linear_stiffness"), "--each-record linear_stiffness: there is one record; expected two"),
     (("--response", "acceleration"), "no acceleration was measured at a; expected --response displacement"),

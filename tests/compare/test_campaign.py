@@ -73,3 +73,12 @@ def test_a_comparison_without_one_response_has_no_level():
     verdicts, values = told(*campaign.measured_of_row("frame", "hall", comparison, whole.diagnosis))
     assert verdicts.rows[0][:3] == ("frame", "", "20 %")
     assert not values
+
+
+def test_effects_of_a_structure_are_named_with_their_places():
+    frame = measured("x", "frame", 1.0, 355.0)
+    first = {**frame.diagnosis["candidates"][0], "between": ["low", "top"]}
+    first["tied_with"] = [{"term": "cogging", "at": "top"}]
+    diagnosis = {**frame.diagnosis, "candidates": [first]}
+    verdicts, _ = told(*campaign.measured_of_row("frame", "hall", frame.comparison, diagnosis))
+    assert verdicts.rows[0][5] == "cubic stiffness between low and top or cogging at top"

@@ -16,7 +16,7 @@ from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE, HERE, Place
 from study.records.interpolation import between_samples
-from study.records.record import Record
+from study.records.record import MOTIONS, Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
@@ -203,6 +203,15 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns
+
+
+def along(direction: Sequence[float], model: Model, record: Record) -> Record:
+    """A relative motion of a completed record as that of a single mass, with the channels that formulas may name."""
+    total = np.zeros((len(MOTIONS), len(record)))
+    for coordinate, weight in zip(model.coordinates, direction, strict=True):
+        if weight != 0.0:
+            total += weight * record.motion(coordinate)
+    return record.relative(total)
 
 
 def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import linear_keys, matrices, patterns
+from study.equations.linear_part import acting, linear_keys, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
@@ -174,7 +174,7 @@ def _problem(model: Model, prepared: Prepared, held: Mapping[str, float]) -> tup
         if key in held:
             known += held[key] * s[:, None, None] ** orders[key] * own[key]
     units = np.array([s[:, None, None] ** orders[key] * own[key] for key in free], dtype=np.complex128)
-    force = np.array([[float(c == where) for _, where in model.forces] for c in model.coordinates])
+    force = acting(model.with_values(held))
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1).astype(np.complex128)
     rows = [model.coordinates.index(x.coordinate) for x in prepared.sensors]
     heavy = [i for i, key in enumerate(free) if orders[key] == 2 and "," not in key]

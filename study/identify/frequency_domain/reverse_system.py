@@ -11,15 +11,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from study.equations.linear_part import acting
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, Settings, named_parameters
 from study.identify.estimators.in_reverse import identify_lines
 from study.identify.frequency_domain import coefficients, conditioned, local_polynomial
-from study.identify.frequency_domain.inputs import INERTIA, Input, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import INERTIA, Input, along, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial import Lines, transform
 from study.records import spectra
 from study.records.prepared import Prepared
-from study.records.record import MOTIONS, Record
+from study.records.record import Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
@@ -116,7 +117,9 @@ def _equation(
     cache: dict[tuple[float, ...], Record],
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
-    drives = [record[name] for name, where in model.forces if where == coordinate and np.any(record[name])]
+    own = acting(model)[model.coordinates.index(coordinate)]
+    pairs = zip(own, model.forces, strict=True)
+    drives = [unit * record[name] for unit, (name, _) in pairs if unit != 0.0 and np.any(record[name])]
     output = np.sum(drives, axis=0) if drives else -prepared.record.motion(coordinate)[INERTIA]
     if not drives:
         mass = next(
@@ -127,7 +130,7 @@ def _equation(
     part, values = slice(*span), list[Floats]()
     for item in inputs:
         if item.direction not in cache:
-            cache[item.direction] = _relative(model, prepared, item.direction)
+            cache[item.direction] = along(item.direction, model, record)
         values += histories((item,), cache[item.direction])
     return Equation(coordinate, inputs, mass, tuple(x[part] for x in (*values, output)))
 
@@ -142,15 +145,6 @@ def _without(inputs: tuple[Input, ...], key: str) -> tuple[Input, ...]:
         for i in inputs
     ]  # fmt: skip
     return tuple(i for i in rest if i.parts)
-
-
-def _relative(model: Model, prepared: Prepared, direction: Sequence[float]) -> Record:
-    """A relative motion as the record of a single mass, with the channels that formulas may name."""
-    total = np.zeros((len(MOTIONS), len(prepared.record)))
-    for coordinate, weight in zip(model.coordinates, direction, strict=True):
-        if weight != 0.0:
-            total += weight * prepared.record.motion(coordinate)
-    return prepared.record.relative(total)
 
 
 def by_conditioned_spectra(equations: Sequence[Equation], dt: float, settings: Settings) -> ReverseSystem:

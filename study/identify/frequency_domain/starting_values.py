@@ -12,10 +12,14 @@ import numpy as np
 from scipy.fft import rfft, rfftfreq
 
 from study.equations.free_run import needed_steps, prepare
+from study.equations.linear_part import linear_keys
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
+from study.identify.frequency_domain.linear_start import lumped_start
+from study.identify.time_domain.free_decay import free_decay_start
+from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -108,7 +112,18 @@ def solved(lines: LinearApproximation, wanted: Sequence[str]) -> tuple[Floats, F
 
 
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
+    """Masses, dampings and stiffnesses of the best linear approximation; zero for everything else.
+
+    Those that a structure holds are as it has them.
+    """
+    if is_alone(model):
+        alone = linear_start(model_alone(model), prepared_alone(prepared))
+        return dict(zip(model.values, alone.values(), strict=True))
+    if model.named:
+        given = {key: value for key, value in model.values.items() if value is not None}
+        start = free_decay_start if prepared.free else lumped_start
+        known = {key: given[key] for key in linear_keys(model) if key in given}
+        return dict.fromkeys(model.values, 0.0) | known | start(model, prepared, given)
     if prepared.response == FORCE:
         linear = [key for key in LINEAR_ORDERS if key in model.values]
         known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))  # others count as zero

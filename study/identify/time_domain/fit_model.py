@@ -33,6 +33,14 @@ from study.identify.time_domain.part_fit import covariance_of, fit_part, lineari
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline, Start
 from study.identify.time_domain.structure_start import first_fit
+from study.identify.time_domain.told_alone import (
+    entry_alone,
+    fit_alone,
+    is_alone,
+    model_alone,
+    prepared_alone,
+    told_back,
+)
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
@@ -69,6 +77,11 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     StudyError
         If the model cannot be fitted.
     """
+    if is_alone(model):
+        alone = model_alone(model)
+        told = dict(zip(model.values, alone.values, strict=True))
+        begun = None if start is None else {told[key]: value for key, value in start.items()}
+        return told_back(fit_model(alone, prepared_alone(prepared), begun), model, prepared.outputs)
     if not model.named and "inertia" not in model and prepared.response != FORCE:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, prepared)
@@ -179,6 +192,10 @@ def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) ->
     StudyError
         If none of them has a finite response.
     """
+    if is_alone(base.fit.model):
+        alone = replace(base, fit=fit_alone(base.fit), prepared=prepared_alone(base.prepared))
+        found = with_term(alone, entry_alone(entry, base.fit.model), points)
+        return told_back(found, base.fit.model.with_term(entry), base.prepared.outputs)
     given = {key: value for key, value in entry.values.items() if value is not None}
     fit, prepared = base.fit, base.prepared
     if fit.model.modal:

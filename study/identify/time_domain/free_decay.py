@@ -29,6 +29,8 @@ def free_decay_start(model: Model, prepared: Prepared, held: Mapping[str, float]
     """
     orders, own = linear_keys(model), patterns(model)
     free = [key for key in orders if key not in held]
+    if not free:
+        return {}
     open_masses = ", ".join(key for key in free if orders[key] == 2)
     sentence = f"nothing drives {model.name!r}: its motion says nothing of {open_masses}; expected a value for each"
     expect(not open_masses, sentence)

@@ -10,12 +10,12 @@ from study.equations.free_run import needed_steps
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit, released
-from study.identify.time_domain.motion_start import from_the_motion
+from study.identify.time_domain.motion_start import from_the_motion, seen_everywhere
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.identify.time_domain.shooting import slowest_rate
 from study.identify.time_domain.stretch_states import POOR, is_poor
 from study.records.prepared import FORCE, Prepared
-from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
 
 PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
@@ -40,7 +40,7 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
     fine = with_enough_steps(fit, prepared)
-    if fit.model.named:
+    if not seen_everywhere(fit.model, prepared):
         return fine
     return replace(from_the_motion(_settled(fine, prepared), prepared), elsewhere=fit.elsewhere)
 
@@ -134,15 +134,17 @@ def better_fit(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit |
 def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
     """A fit that begins where multiple shooting ends; None where the model cannot run even in segments.
 
-    A motion that is prescribed drifts from nothing: there is nothing to cut. Segments begin from what is known of a
-    single coordinate.
+    A motion that is prescribed drifts from nothing: there is nothing to cut. Segments begin with states that sensors
+    show.
     """
-    if prepared.response == FORCE or model.named:
+    if prepared.response == FORCE or not seen_everywhere(model, prepared):
         return None
-    length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
+    motions = prepared.measured[slice(*prepared.plan.fit)]
+    length = round(PERIODS * 2.0 * np.pi / (slowest_rate(motions, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
     try:
-        linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
+        opened = model.with_values({key: None for key in model.values if key not in held})
+        linear = linear_start(opened, prepared)  # a short stretch may hold hardly any motion
         start = {key: value for key, value in linear.items() if key not in held and "." not in key}
         near = fit_in_segments(
             model, prepared.record, start=start, held=held, outputs=prepared.outputs, span=stretch.plan.fit

@@ -24,6 +24,7 @@ from study.identify.frequency_domain.starting_values import linear_start, oscill
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
 from study.identify.time_domain.reverse_search import EquationsAlongMotion, equations_along_motion
+from study.identify.time_domain.told_alone import fit_alone, is_alone, prepared_alone
 from study.records.interpolation import between_samples
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
@@ -131,9 +132,10 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     motions = tuple(Sensor(c, m) for m in MOTIONS for c in fit.model.coordinates)
     free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
-    several = len(fit.model.coordinates) > 1 or fit.model.modal
-    linear, approximation = ({}, {}) if several else _linear(fit, prepared)
-    return Baseline(fit, prepared, basis, motion, linear, approximation)
+    if len(fit.model.coordinates) > 1 or fit.model.modal:
+        return Baseline(fit, prepared, basis, motion, {}, {})
+    one = (fit_alone(fit), prepared_alone(prepared)) if is_alone(fit.model) else (fit, prepared)
+    return Baseline(fit, prepared, basis, motion, *_linear(*one))
 
 
 def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
@@ -52,16 +53,17 @@ def needed_restarts(
     """Which restarts of a fitted model have to stay, given the state at the beginning of each segment.
 
     The derivative of the state at a segment's end by that at its beginning is taken from a free run; products
-    of them say how a disturbance at any restart grows until any later one. Displacement and velocity are
-    weighted by the angular rate of the motion, so that a linear system without damping has growth one.
+    of them say how a disturbance at any restart grows until any later one. Displacements and velocities are
+    counted in what is independent of the motion, so that a linear system without damping has growth one.
     """
     if not restarts:  # a motion of a single period or less
         return ()
-    sensors = [Sensor(coordinate, "displacement") for coordinate in model.coordinates]
+    sensors = [Sensor(coordinate, "displacement") for coordinate in model.inertial]
     run = prepare(model, record, sensors=sensors, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
     motion, _, arrivals = run.respond_by_segment({}, states, run.moving)
-    rate, n = slowest_rate(motion, record.dt), run.moving // 2
-    weighted = arrivals[:, : 2 * n, 1:] * np.kron(np.array([[1.0, rate], [1.0 / rate, 1.0]]), np.ones((n, n)))
+    counted = [_independent(x) for x in (motion - np.mean(motion, axis=0), np.diff(motion, axis=0) / record.dt)]
+    unit = block_diag(*counted)
+    weighted = np.linalg.inv(unit) @ arrivals[:, : run.moving, 1:] @ unit
     kept: list[int] = []
     grown: list[Floats] = []  # from each restart that matters to where the present segment ends
     own = own_begins(record, span)
@@ -76,6 +78,16 @@ def needed_restarts(
         # What has shrunk can grow no further than what begins here will.
         grown = [p for p, size in zip(grown, sizes, strict=True) if size > 1.0]
     return tuple(kept)
+
+
+def _independent(motions: Floats) -> Floats:
+    """Motions, shape (n, motions), as multiples of independent ones of unit size: their mixture, (motions, motions).
+
+    The modes of a linear structure stay apart, whatever the size of each.
+    """
+    size, vectors = np.linalg.eigh(motions.T @ motions / len(motions))
+    least = np.finfo(float).eps * max(float(size[-1]), np.finfo(float).tiny)
+    return np.asarray(vectors * np.sqrt(np.maximum(size, least)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -138,9 +150,9 @@ class ShootingSegments:
         Shape (segments, states). A width with which the model diverges is left out.
         """
         begins = (self.span[0], *self.restarts)
-        count = 2 * len(model.coordinates)
+        count = 2 * len(model.inertial)
         best, least = np.zeros((len(begins), count + len(model.states))), np.full(len(begins), np.inf)
-        for moving in self._shown(begins, model.coordinates):
+        for moving in self._shown(begins, model.inertial):
             states = np.zeros_like(best)
             states[:, :count] = moving
             try:

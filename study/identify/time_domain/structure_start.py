@@ -6,23 +6,14 @@ from contextlib import suppress
 import numpy as np
 
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import linear_keys
 from study.equations.model import Model
-from study.identify.frequency_domain.linear_start import lumped_start
-from study.identify.time_domain.free_decay import free_decay_start
+from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
 from study.support.errors import DivergenceError, expect
-
-
-def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
-    """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
-    held = {key: value for key, value in model.values.items() if value is not None}
-    start = free_decay_start if prepared.free else lumped_start
-    return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 
 def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
@@ -36,10 +27,9 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
         If no fit begins.
     """
     if model.modal:
-        return modal_fit(model, prepared)  # as many modes as the record shows
-    linear = known_linear(model, prepared)
-    open_keys = [key for key, value in model.values.items() if value is None]
-    start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
+        return modal_fit(model, prepared)
+    linear = linear_start(model, prepared)
+    start = {key: linear[key] for key, value in model.values.items() if value is None}
     fits: list[FreeRunFit] = []
     with suppress(DivergenceError):
         fits.append(_begun(model, prepared, start))
