@@ -1,6 +1,6 @@
 """A page to see the loop on: compare, diagnose, add, watch the error fall.
 
-No mathematics of its own: ``session`` keeps the models tried and calls what the commands call. ``view`` turns a model's
+No mathematics of its own: ``session`` keeps the models tried, and calls what commands call. ``view`` turns a model's
 findings on a record into columns: of the record, of each sensor, of each place; a single mass has one of each. ``words``
 turns them into sentences, ``cards`` says what stands on the page, ``plots`` draws, ``html_page`` puts it together.
 ``saved`` makes one file that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the

@@ -46,7 +46,7 @@ def difference(s: Sources, time: Any) -> Any:
     noise = drawn.multi_line("t", "level", source=s["noise"], **theme.NOISE)
     theme.chosen(drawn, "box_difference")
     theme.follows(drawn, [line, noise])
-    named = [("measured less predicted", [line]), ("± twice the noise", [noise])]
+    named = [("difference", [line]), ("± twice the noise", [noise])]
     theme.legend(drawn, [*named, ("candidate", [would]), ("pinned", [pinned])])
     return drawn
 

@@ -78,7 +78,7 @@ def equation(stage: Stage, values: bool = False) -> str:
 def _figures(comparison: Comparison) -> str:
     """The large numbers; of several sensors the worst is told, of one what its error is in its own unit."""
     prediction, worst = comparison.prediction, comparison.worst
-    about = f"worst {in_percent(worst.error)} at {worst.sensor}"
+    about = f"worst {in_percent(worst.error)} at {worst.sensor.coordinate}"
     if len(comparison.views) == 1:
         size = worst.error * worst.size
         shown = motion(comparison.record.unit(worst.sensor), size)
