@@ -2,7 +2,6 @@
 
 No mathematics of its own: ``session`` keeps the models tried, and calls what commands call. ``view`` turns a model's
 findings on a record into columns: of the record, of each sensor, of each place; a single mass has one of each. ``words``
-turns them into sentences, ``cards`` says what stands on the page, ``plots`` draws, ``html_page`` puts it together.
-``saved`` makes one file that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the
-live page.
+tell them, ``cards`` says what stands on the page, ``plots`` draws, ``html_page`` puts it together. ``saved`` makes one
+file that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the live page.
 """

@@ -147,7 +147,7 @@ window.study = (() => {
     put("shown", {...shown, zero: shown.f.map(() => 0)})
     if (element) model("constancy_y").axis_label = element.dataset.label
     const empty = place("constancy-none")
-    say("constancy-of", element ? `${element.querySelector(".name").textContent}, 95 % intervals` : "")
+    say("constancy-of", element ? `${element.dataset.of}, 95 % intervals` : "")
     place("constancy-card")?.classList.toggle("none", !keep.length)
     if (empty) empty.hidden = keep.length > 0 || document.querySelector("#verdict h3") === null
     if (empty) empty.textContent = element ? LITTLE : NOBODY

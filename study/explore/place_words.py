@@ -15,7 +15,7 @@ from study.equations.place import place_in_words
 from study.explore.axis_scales import Focus
 from study.explore.page_units import in_percent, in_text, with_error
 from study.explore.session import Stage
-from study.explore.words import VERDICTS, gives, in_words
+from study.explore.words import in_words
 from study.figures.sketch import Link, Sketch, svg
 from study.support.numbers import percent
 
@@ -55,10 +55,8 @@ def several_places(found: Stage, stage: Stage, drawn: Sketch | None, nearest: Ma
 
 
 def _hint(stage: Stage) -> str:
-    if stage.diagnosis is not None and stage.diagnosis.verdict in VERDICTS and stage.diagnosis.candidates:
-        first = stage.diagnosis.candidates[0]
-        if gives(first):
-            return "A connection glows with the share of what is left that the effect found there explains."
+    if stage.diagnosis is not None and stage.diagnosis.answer is not None:
+        return "A connection glows with the share of what is left that the effect found there explains."
     return "A connection glows with the share of what is left that general functions of its own motion explain."
 
 

@@ -56,9 +56,10 @@ class Stage:
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
-        """The candidates that a page lists: the best, and all of the user's own."""
+        """What a page lists: sets of effects, the best single ones, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
-        return (*rows[:SHOWN], *(r for r in rows[SHOWN:] if r.term.name not in LIBRARY))
+        sets = [r for r in self.diagnosis.sets if len(r.entries) > 1] if self.diagnosis is not None else []
+        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if r.term.name not in LIBRARY))
 
     @property
     def values(self) -> dict[str, float]:
@@ -173,8 +174,11 @@ def on_record(stage: Stage, number: int) -> Stage:
         return stage
     comparison, diagnosis = stage.on_each[number], stage.diagnosis
     if diagnosis is not None:
-        rows = [replace(r, prediction=r.prediction.along(comparison.prepared)) for r in diagnosis.candidates]
-        diagnosis = replace(diagnosis, candidates=tuple(rows))
+        candidates, sets = (
+            tuple(replace(row, prediction=row.prediction.along(comparison.prepared)) for row in rows)
+            for rows in (diagnosis.candidates, diagnosis.sets)
+        )
+        diagnosis = replace(diagnosis, candidates=candidates, sets=sets)
     would = {name: (lacking[number],) for name, lacking in stage.would.items()}
     return replace(stage, comparison=comparison, diagnosis=diagnosis, would=would)
 

@@ -11,10 +11,8 @@ from bokeh.document import Document
 
 from study.compare import history
 from study.compare.comparison import compare
-from study.compare.each_record import separated
 from study.equations import model_file
 from study.explore import session as sessions
-from study.explore.by_record import Several, by_record
 from study.explore.desk import Desk
 from study.explore.live import Watcher
 from study.explore.saved import saved
@@ -201,22 +199,6 @@ def test_several_records_of_a_structure_are_shown_one_by_one(hall):
     stored = set(re.findall(r"\w+@\d\.\d[.\w -]*", page))
     assert {"words@0.0", "words@0.1", "plane@0.1.place.floor2-floor3"} <= stored
     assert "time@0.1.sensor.floor1 displacement" in stored
-
-
-def test_a_coefficient_at_a_place_may_differ_between_records_within_the_one_fit(hall):
-    """What tells the records apart belongs to the session alone: the model file has the model's own terms."""
-    text = (hall / "frame.yaml").read_text()
-    model = model_file.read_model(hall / "frame.yaml")
-    whole = read_record(hall / "frame.csv", roles=model.roles)
-    parts = [replace(whole.part(*span), name=name) for name, span in (("first", (0, 800)), ("then", (800, 1600)))]
-    fuller, marked, separate = separated(model, parts, ["k[floor2-floor3]"])
-    together = compare_records(marked, fuller).comparison
-    several = Several((), tuple(parts), separate)
-    session = sessions.begin_with(together, several=several, known=by_record(several, together))
-    (level,) = session.now.by_record.levels
-    assert (level.key, session.now.by_record.names) == ("k[floor2-floor3]", ("first", "then"))
-    written = model_file.parse_model(files(session, "frame.yaml", text, drawn={})["frame.yaml"].decode(), hall)
-    assert [t.name for t in written.terms] == [t.name for t in model.terms]
 
 
 def test_the_live_page_turns_to_the_sensor_and_the_place_that_are_asked_for(grown, hall, tmp_path):
