@@ -19,7 +19,6 @@ from bokeh.palettes import RdBu11
 from study.explore import theme
 
 Sources = Mapping[str, ColumnDataSource]
-EACH, ROOM = 24, 74  # pixels: a sensor's bar, and what axis and legend take
 
 
 def response(s: Sources, time: Any) -> Any:
@@ -112,7 +111,7 @@ def spectrum(s: Sources, frequency: Any) -> Any:
 def sensors(s: Sources) -> Any:
     """Error of each sensor over its rms motion, beside what noise alone would leave."""
     names = _names(s["sensors"], 0.1)
-    height = ROOM + EACH * max(len(names.factors), 3)
+    height = 74 + 24 * max(len(names.factors), 3)  # pixels
     drawn = theme.panel("sensors", height, "error of the sensor / %", "", narrow=True, ranges=(None, names))
     error = drawn.hbar(y="name", right="error", height=0.6, source=s["sensors"], fill_color="#e08a4a", line_color=None)
     floor = drawn.hbar(y="name", right="floor", height=0.22, source=s["sensors"], fill_color=theme.INK, line_color=None)

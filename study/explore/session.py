@@ -143,7 +143,7 @@ def undone(session: Session) -> Session:
 def candidate(session: Session, name: str) -> Ranked:
     """The effect or set of this name in the present diagnosis, which must have one."""
     diagnosis = session.now.diagnosis
-    for row in (*diagnosis.sets, *diagnosis.candidates) if diagnosis is not None else ():
+    for row in (*diagnosis.candidates, *diagnosis.sets) if diagnosis is not None else ():
         if row.name == name:
             return row
     raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
@@ -273,12 +273,6 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
     return term
 
 
-def _attempted(term: Term, session: Session) -> FittedCandidate | None:
-    """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
-    attempt = candidates.attempt(free(term), search_base(session.now.comparison))
-    return None if attempt is None else candidates.all_settled([attempt], session.prepared)[0]
-
-
 def tried(session: Session, text: str) -> Session:
     """The session with a formula of the user's among the candidates, fitted and ranked with them.
 
@@ -300,10 +294,10 @@ def tried(session: Session, text: str) -> Session:
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
-            attempt = _attempted(term, session)
+            attempt = candidates.attempt(free(term), search_base(now.comparison))
             if attempt is None:
                 raise StudyError(silent)
-            rows = rank([*known, attempt], now.comparison)
+            rows = rank([*known, *candidates.all_settled([attempt], session.prepared)], now.comparison)
     except np.linalg.LinAlgError:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))

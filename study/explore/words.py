@@ -38,7 +38,6 @@ SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
 )
-SETS, SINGLE = "sets of effects that this record cannot tell apart", "single effects"
 ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
 
 
@@ -130,7 +129,8 @@ def _candidates(stage: Stage, live: bool) -> str:
         others, left = f"{more} more effects and places explain less, or no more than chance would", []
     rows: list[str] = [HEAD] if offered else []
     sets = tuple(row for row in diagnosis.sets if len(row.entries) > 1)
-    for kind, those in ((SETS, sets), (SINGLE, diagnosis.candidates)):
+    apart = "sets of effects, which this record cannot tell apart" if len(sets) > 1 else "set of effects"
+    for kind, those in ((apart, sets), ("single effects", diagnosis.candidates)):
         own = [_row(i, row, _rank(row, those), stage, live) for i, row in offered.items() if row in those]
         rows += [f"<li class='kind'>{kind}</li>" if sets and own else "", *own]
     rest = f"<li class='more'>{others}{escape(': ' + ', '.join(left)) if left else ''}</li>" if more > 0 else ""
@@ -153,7 +153,7 @@ def _row(number: int, row: Ranked, rank: str, stage: Stage, live: bool) -> str:
     explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} %"
     names = [_name(entry) for entry in row.entries]
     shown = "".join(f"<b>{name}</b>{f' <i>{place}</i>' if place else ''}" for name, place in names)
-    spoken = ", ".join(" ".join(filter(None, name)) for name in names)
+    spoken = ", ".join(" ".join(name).strip() for name in names)
     place = row.effect.entry.place
     # the sketch may have the ends of the place the other way round
     sketched = next((known.label for known in connections(stage.model) if known.path == place.path), place.label)
@@ -161,7 +161,7 @@ def _row(number: int, row: Ranked, rank: str, stage: Stage, live: bool) -> str:
     return (
         f"<li class='candidate{' set' if len(names) > 1 else ''}' data-candidate='{number}' "
         f"data-row='{escape(row.name)}'{at} "
-        f"data-label='{escape(_label(row))}' data-of='{' '.join(_name(row.effect.entry))}' tabindex='0' "
+        f"data-label='{escape(_label(row))}' data-of='{' '.join(_name(row.effect.entry)).strip()}' tabindex='0' "
         f"aria-label='{spoken}, explains {explained}'><span class='rank'>{rank}</span>"
         f"<span class='name' title='{spoken}; a click pins it beside another'>{shown}</span>{_ties(row)}{bar(row.gain)}"
         f"<span class='explained'>{explained}</span>{add}<small hidden>{_detail(row)}</small></li>"

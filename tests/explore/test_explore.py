@@ -294,6 +294,27 @@ def test_ties_are_shown_as_ties(asked):
     assert html.count("class='tie'") == 2
 
 
+def test_a_set_of_effects_is_a_row_whose_click_adds_all_of_it(asked):
+    """Beside the single effects, which are counted by themselves; the preview is of the set."""
+    first, second = asked.now.diagnosis.candidates[:2]
+    both = replace(first, entries=first.entries + second.entries, effects=first.effects + second.effects, tied_with=())
+    diagnosis = replace(asked.now.diagnosis, verdict="missing_effects", sets=(both,))
+    stage = sessions.with_diagnosis(replace(asked.now, would={}), diagnosis)
+    assert [row.name for row in stage.shown[:2]] == [both.name, first.name]
+    assert both.name in stage.would
+    said = words.words(stage, 0, True)
+    head, row, *singles = re.findall(r"<li class='(?:kind|candidate)[^>]*>.*?</li>", said["candidates"])
+    assert "set of effects" in head
+    assert f"data-act='add' data-name='{both.name}'" in row
+    assert all(f"<b>{words.in_words(name)}</b>" in row for name in (first.name, second.name))
+    assert "together they explain" in row
+    assert "single effects" in singles[0]
+    assert [re.search(r"class='rank'>(.)<", html)[1] for html in (row, singles[1])] == ["1", "1"]
+    assert "Several effects are missing" in said["verdict"]
+    assert View(stage, 0).of_sensor("displacement")["would_time"].keys() == {str(i) for i in range(len(stage.shown))}
+    assert sessions.candidate(replace(asked, stages=(stage,)), both.name) is both
+
+
 def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
     given = Model("rig", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
     model = given.with_term(get("quadratic_damping")).with_values({"k": 355.0})
