@@ -27,10 +27,10 @@ from playwright.sync_api import TimeoutError as PageTimeoutError
 from scripts.page_picture import QUIET, browser
 from study import trials
 from study.equations import model_file
-from study.explore import any_page, html_page, session
+from study.explore import html_page, session
 from study.explore.saved_files import files, of_stage
 from study.explore.server import AGAIN
-from study.explore.view import view
+from study.explore.view import View
 from study.records.prepared import prepare_record
 from study.records.record import write_csv
 from study.support.errors import StudyError
@@ -175,13 +175,13 @@ def alone(trial: Any) -> dict[str, float]:
     stage, _ = session.examined(now)
     now = session.with_stage(now, stage)
     after = session.with_added(now, stage.shown[0].name)
-    history = any_page.history_columns(after)
+    before, grown = View(now.now, 0), View(after.now, 1)
     text = model_file.format_model(trial.believed)
     drawn = of_stage(now.now)
     work: dict[str, Callable[[], object]] = {
         "add: fit": lambda: session.with_added(now, stage.shown[0].name),
-        "add: columns": lambda: view(after.now, 1),
-        "first paint: document": lambda: html_page.build(view(now.now, 0), history),
+        "add: columns": lambda: [grown.of_record(after), grown.of_sensor(grown.sensors[0]), grown.of_place("")],
+        "first paint: document": lambda: html_page.build(before, now, before.sensors[0], ""),
         "save: page, history": lambda: files(now, "rig.yaml", text, drawn=drawn),
         "drawn ahead of save": lambda: of_stage(now.now),
     }

@@ -24,9 +24,8 @@ SHARED_CALLS = {
     "read": ("records/readers/", "interface/"),
     "simulate": ("equations/", "interface/"),
 }
-# The pages of a single mass and of a structure answer the same calls; a panel is called after what it draws.
-PAGES = "explore/"
-PANELS = {"explore/plots.py", "explore/placed_panels.py", "explore/check_plots.py"}
+# A panel of the page is called after what it draws.
+PANELS = {"explore/plots.py", "explore/check_plots.py"}
 
 
 def imported(path: Path) -> set[str]:
@@ -99,9 +98,8 @@ def test_no_class_name_stands_for_two_things():
 def test_no_function_name_stands_for_two_things():
     twice: dict[str, set[str]] = {}
     for name, where in homes((ast.FunctionDef, ast.AsyncFunctionDef)).items():
-        distinct = {PAGES if w.startswith(PAGES) else w for w in where - PANELS}
-        if len(distinct) > 1:
-            twice[name] = distinct
+        if len(where - PANELS) > 1:
+            twice[name] = where - PANELS
     assert {name: where for name, where in twice.items() if name not in SHARED_CALLS} == {}
     for name, packages in SHARED_CALLS.items():
         assert len(twice[name]) > 1

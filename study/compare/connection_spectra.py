@@ -1,4 +1,4 @@
-"""What spectra say of each connection: the force that is missing there, and its dynamic stiffness as measured."""
+"""The dynamic stiffness of each connection as spectra show it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -46,21 +46,6 @@ def highest_frequency(comparison: Comparison) -> float:
     half = 0.5 / comparison.prepared.dt
     fastest = HIGHEST * float(np.max(comparison.modes.frequency))
     return min(half, fastest) if fastest > 0.0 else half
-
-
-def missing_force_spectra(comparison: Comparison) -> tuple[Floats, dict[frozenset[str], Floats]]:
-    """Autospectra of the force that each connection lacks, in N^2/Hz by what it lies between, and their lines in Hz.
-
-    Of the connections whose coordinates are all measured.
-    """
-    missing, dt = comparison.missing, comparison.prepared.dt
-    found: dict[frozenset[str], Floats] = {}
-    frequency = np.empty(0)
-    for place in missing.shown:
-        lacking = missing.at(place)
-        sure = lacking.force[lacking.inner]
-        frequency, found[place.path] = spectra.autospectrum(sure, dt, segments_of(len(sure)))
-    return frequency, found
 
 
 def dynamic_stiffnesses(comparison: Comparison) -> dict[frozenset[str], DynamicStiffness]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 
-from study.compare.comparison import Comparison
 from study.compare.force_map import CLASSES, cells_of, edges
+from study.compare.missing_force import MissingForce
+from study.compare.prediction import Prediction, SensorPrediction
 from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]
@@ -31,43 +32,47 @@ class Classes:
 
 
 @dataclass(frozen=True)
-class Links:
-    """Blocks of the judging part."""
+class Visits:
+    """The motions at one place, block by block."""
 
-    edges: Floats  # times in seconds; shape (blocks + 1,)
-    frequency: Floats  # in hertz; shape (lines,)
-    power: Floats  # autospectral density of the difference around the middle of each block; shape (blocks, lines)
     displacement: Classes  # what each block holds of the curves
     velocity: Classes
     cells: Floats  # samples in the cells of the map, by displacement, then velocity; shape (blocks, cells^2)
 
 
-def links(comparison: Comparison) -> Links:
-    """Tie the stretches, bands and amplitudes of a comparison to each other."""
-    n = len(comparison.prediction.residual)
-    count = int(np.clip(n // SHORTEST, 1, BLOCKS))
-    bounds = np.linspace(0, n, count + 1).round().astype(np.int64)
-    lacking = comparison.missing_force
-    block = np.searchsorted(bounds, np.arange(n), side="right") - 1
-    place = block[lacking.inner]
-    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    frequency, power = _spectra(comparison.prediction.residual, comparison.prediction.dt, bounds)
-    time = comparison.prediction.time
-    times = np.append(time[bounds[:-1]], time[-1] + comparison.prediction.dt)
-    return Links(
-        times, frequency, power, _classes(u, force, place, count),
-        _classes(v, force, place, count), _cells(u, v, place, count),
-    )  # fmt: skip
+def times_of_blocks(prediction: Prediction) -> Floats:
+    """Edges of the blocks of the judging part in seconds, shape (blocks + 1,)."""
+    time = prediction.time
+    return np.append(time[_bounds(len(time))[:-1]], time[-1] + prediction.dt)
 
 
-def _spectra(values: Floats, dt: float, bounds: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Density around the middle of each block, from a window that may reach beyond it."""
+def power_in_blocks(seen: SensorPrediction) -> tuple[Floats, Floats]:
+    """Lines in hertz, and the autospectral density of a sensor's difference about the middle of each block.
+
+    Shapes (lines,) and (blocks, lines). The window of a spectrum may reach beyond its block.
+    """
+    values, bounds = seen.residual, _bounds(len(seen.residual))
     length = min(WINDOW, 2 ** int(np.log2(len(values))))
     taper = Segments(length).taper()
     first = np.clip((bounds[1:] + bounds[:-1] - length) // 2, 0, len(values) - length)
     cut = np.lib.stride_tricks.sliding_window_view(values, length)[first] * taper
-    density = 2.0 * dt / np.sum(taper**2) * np.abs(np.asarray(rfft(cut, axis=1))) ** 2
-    return np.asarray(rfftfreq(length, dt)), density
+    density = 2.0 * seen.dt / np.sum(taper**2) * np.abs(np.asarray(rfft(cut, axis=1))) ** 2
+    return np.asarray(rfftfreq(length, seen.dt)), density
+
+
+def visits_in_blocks(lacking: MissingForce) -> Visits:
+    """What each block holds of the motions at the place where a force is missing."""
+    n = len(lacking.force)
+    bounds = _bounds(n)
+    count = len(bounds) - 1
+    block = (np.searchsorted(bounds, np.arange(n), side="right") - 1)[lacking.inner]
+    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
+    return Visits(_classes(u, force, block, count), _classes(v, force, block, count), _cells(u, v, block, count))
+
+
+def _bounds(samples: int) -> NDArray[np.int64]:
+    """First sample of each block, and the one after the last."""
+    return np.linspace(0, samples, int(np.clip(samples // SHORTEST, 1, BLOCKS)) + 1).round().astype(np.int64)
 
 
 def _place(values: Floats, bounds: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -36,46 +36,24 @@ class ResidualChecks:
     counts: Floats  # share of the samples over the width of a bin: a normal density if it is one; shape (bins,)
 
 
-@dataclass(frozen=True)
-class OwnChecks:
-    """What a residual shows of itself: see :class:`ResidualChecks`, whose names these are."""
-
-    lag: Floats
-    autocorrelation: Floats
-    band: float
-    edges: Floats
-    counts: Floats
-
-
-def own_checks(residual: Floats, dt: float) -> OwnChecks:
-    """Autocorrelation at lags in seconds, and distribution, of a residual of shape (n,) every ``dt`` seconds."""
-    n, lags = len(residual), _lags(residual)
-    residual = residual - np.mean(residual)
-    own = cross_correlation(residual, residual, lags)[lags - 1 :]
-    edges = np.linspace(-REACH, REACH, BINS + 1).astype(np.float64)
-    counts = np.histogram(residual / (float(np.std(residual)) or 1.0), edges)[0] / (n * (edges[1] - edges[0]))
-    return OwnChecks(dt * np.arange(lags, dtype=np.float64), own, QUANTILE / np.sqrt(n), edges, counts)
-
-
-def _lags(residual: Floats) -> int:
-    return min(LAGS, len(residual) // 4)
-
-
-def residual_checks(prediction: Prediction) -> ResidualChecks:
-    """The checks of the residual on the judging part."""
-    prepared, residual = prediction.prepared, prediction.residual
+def residual_checks(prediction: Prediction, sensor: int = 0) -> ResidualChecks:
+    """The checks of the residual of one of the sensors on the judging part."""
+    prepared, residual = prediction.prepared, prediction.of(sensor).residual
     residual = residual - np.mean(residual)
     force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
     force = force - np.mean(force)
-    n, lags, alone = len(residual), _lags(residual), own_checks(residual, prediction.dt)
+    n = len(residual)
+    lags = min(LAGS, n // 4)
     own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)
     both = cross_correlation(residual, force, lags)
     # n times the variance of an estimated cross-correlation is the sum of the autocorrelations' products (Ljung, 16.6)
     spread = max(float(np.sum(own * drive)), 0.0)
     steps = prediction.dt * np.arange(-(lags - 1), lags, dtype=np.float64)
+    edges = np.linspace(-REACH, REACH, BINS + 1).astype(np.float64)
+    counts = np.histogram(residual / (float(np.std(residual)) or 1.0), edges)[0] / (n * (edges[1] - edges[0]))
     return ResidualChecks(
-        alone.lag, alone.autocorrelation, alone.band, steps, both, QUANTILE * float(np.sqrt(spread / n)),
-        alone.edges, alone.counts,
+        steps[lags - 1 :], own[lags - 1 :], QUANTILE / np.sqrt(n), steps, both, QUANTILE * float(np.sqrt(spread / n)),
+        edges, counts,
     )  # fmt: skip
 
 

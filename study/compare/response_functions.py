@@ -41,15 +41,15 @@ class ResponseFunctions:
         return np.degrees(np.angle(self.measured)), np.degrees(np.angle(self.predicted))
 
 
-def response_functions(prediction: Prediction) -> ResponseFunctions:
-    """H1 of the judging part, where the drive has power, up to the record's highest frequency that is judged.
+def response_functions(prediction: Prediction, sensor: int = 0) -> ResponseFunctions:
+    """H1 of one of the sensors on the judging part, where the drive has power.
 
     Raises
     ------
     StudyError
         If the record is of free decays, which nothing drives.
     """
-    prepared, seen = prediction.prepared, prediction.of(0)
+    prepared, seen = prediction.prepared, prediction.of(sensor)
     name = prepared.record.name
     expect(not prepared.free, f"{name}: no force acts; expected a driven record for a frequency response function")
     drive = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]

@@ -1,7 +1,7 @@
 """A page to see the loop on: compare, diagnose, add, watch the error fall.
 
-No mathematics of its own: ``session`` keeps the models tried and calls what the commands call, ``view`` turns a
-model's findings into columns and ``words`` into sentences, ``plots`` and ``html_page`` lay them out; where coordinates
-have names, ``placed_view``, ``placed_words`` and ``placed_panels`` do so by place and sensor. ``saved`` makes one file
-that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the live page.
+No mathematics of its own: ``session`` keeps the models tried, and calls what commands call. ``view`` turns a model's
+findings on a record into columns: of the record, of each sensor, of each place; of a single mass one of each. ``words``
+tell them, ``cards`` says what stands on the page, ``plots`` draws, ``html_page`` puts it together. ``saved`` makes one
+file that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the live page.
 """

@@ -7,31 +7,36 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
 from study.compare.loops import loops
-from study.compare.residual_checks import OwnChecks, ResidualChecks, residual_checks
+from study.compare.residual_checks import residual_checks
 from study.compare.response_functions import response_functions
-from study.explore.axis_scales import Columns, Floats, Scales, heard
+from study.explore.axis_scales import Columns, Focus, heard
 from study.explore.decimate import BUCKETS
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import FORCE
+from study.support.arrays import Floats
 
 NINETY_FIVE = 1.96  # standard errors to each side
 DRIVEN, PRESCRIBED, FREE = "driven", "prescribed", "free"
 
 
-def kind_of(prepared: Prepared) -> str:
+def kind_of(comparison: Comparison) -> str:
     """What those who run such a test look at: response functions, loops too, or frequency and damping by amplitude."""
+    prepared = comparison.prepared
     return PRESCRIBED if prepared.response == FORCE else FREE if prepared.free else DRIVEN
 
 
-def columns(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
-    """By the name of their source, in the units of the axes."""
-    kind = kind_of(comparison.prepared)
-    shown = _decay(comparison, scales) if kind == FREE else {"frf": _functions(comparison, scales)}
-    return shown | (_loops(comparison, scales) if kind == PRESCRIBED else {}) | _checks(comparison)
+def columns(focus: Focus) -> dict[str, Columns]:
+    """Those of the sensor that is looked at by the name of their source, in the units of the axes."""
+    kind = kind_of(focus.comparison)
+    shown = _decay(focus) if kind == FREE else {"frf": _functions(focus, kind)}
+    return shown | (_loops(focus) if kind == PRESCRIBED else {}) | _checks(focus)
 
 
-def _decay(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
-    """Frequency and damping ratio in per cent against amplitude; nothing where the decay is too short for them."""
-    found = decays_of(comparison)
+def _decay(focus: Focus) -> dict[str, Columns]:
+    """Frequency and damping ratio in per cent against amplitude; nothing where the decay is too short for them.
+
+    Nor of a structure, which decays in several frequencies.
+    """
+    found = None if focus.comparison.model.named else decays_of(focus.comparison)
     shown: dict[str, Columns] = {}
     for name, one in (("decay", found and found.measured), ("decay_model", found and found.predicted)):
         rows = np.zeros((5, 0)) if not one else np.array(
@@ -40,39 +45,37 @@ def _decay(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
         at, frequency, damping, *errors = rows[:, np.argsort(rows[0])]
         half = [NINETY_FIVE * e for e in errors]
         shown[name] = {
-            "at": at / scales.response.factor, "frequency": frequency, "frequency_low": frequency - half[0],
+            "at": at / focus.response.factor, "frequency": frequency, "frequency_low": frequency - half[0],
             "frequency_high": frequency + half[0], "damping": 100.0 * damping,
             "damping_low": 100.0 * (damping - half[1]), "damping_high": 100.0 * (damping + half[1]),
         }  # fmt: skip
     return shown
 
 
-def _loops(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
+def _loops(focus: Focus) -> dict[str, Columns]:
     """Force, measured and predicted, beside the motion that was prescribed; and what each cycle takes of energy."""
-    prediction, prepared = comparison.prediction.of(0), comparison.prepared
+    seen, prepared = focus.sensor, focus.comparison.prepared
     part = prepared.record.part(*prepared.plan.judge)
     some = slice(None, None, -(-len(part) // (2 * BUCKETS)))  # dots: a loop is as well seen in every second of them
-    found = loops(comparison.prediction)
-    energy = scales.response.factor * scales.displacement.factor
+    found = loops(focus.comparison.prediction)
+    along, size = focus.displacement.factor, focus.response.factor
     return {
         "loops": {
-            "u": part["displacement"][some] / scales.displacement.factor,
-            "v": part["velocity"][some] / scales.velocity.factor,
-            "measured": prediction.measured[some] / scales.response.factor,
-            "predicted": prediction.predicted[some] / scales.response.factor,
+            "u": part["displacement"][some] / along, "v": part["velocity"][some] / focus.velocity.factor,
+            "measured": seen.measured[some] / size, "predicted": seen.predicted[some] / size,
         },
         "cycles": {
-            "stroke": found.stroke / scales.displacement.factor, "measured": found.measured / energy,
-            "predicted": found.predicted / energy,
+            "stroke": found.stroke / along, "measured": found.measured / (size * along),
+            "predicted": found.predicted / (size * along),
         },
     }  # fmt: skip
 
 
-def _functions(comparison: Comparison, scales: Scales) -> Columns:
-    found = response_functions(comparison.prediction)
-    keep, size = heard(comparison, found.frequency), scales.response.factor
-    if kind_of(comparison.prepared) == PRESCRIBED:
-        size /= scales.displacement.factor
+def _functions(focus: Focus, kind: str) -> Columns:
+    found = response_functions(focus.comparison.prediction, focus.number)
+    keep, size = heard(focus.comparison, found.frequency), focus.response.factor
+    if kind == PRESCRIBED:
+        size /= focus.displacement.factor
     measured, predicted = (values[keep] / size for values in found.magnitude)
     half = NINETY_FIVE * found.error[keep] / size
     angles = [_gapped(values[keep]) for values in found.phase]
@@ -90,20 +93,15 @@ def _gapped(angle: Floats) -> Floats:
     return np.where(gaps, np.nan, angle)
 
 
-def _checks(comparison: Comparison) -> dict[str, Columns]:
-    found = residual_checks(comparison.prediction)
-    return by_itself(found) | {
-        "with_force": {"lag": found.lag_force, "value": found.with_force},
-        "with_force_band": _band(found.lag_force, found.band_force),
-    }
-
-
-def by_itself(found: OwnChecks | ResidualChecks) -> dict[str, Columns]:
-    """Autocorrelation and distribution of a residual, by the name of their source."""
+def _checks(focus: Focus) -> dict[str, Columns]:
+    """Autocorrelation and distribution of the residual, and its correlation with the force."""
+    found = residual_checks(focus.comparison.prediction, focus.number)
     normal = np.linspace(float(found.edges[0]), float(found.edges[-1]), 81).astype(np.float64)
     return {
         "autocorrelation": {"lag": found.lag, "value": found.autocorrelation},
         "autocorrelation_band": _band(found.lag, found.band),
+        "with_force": {"lag": found.lag_force, "value": found.with_force},
+        "with_force_band": _band(found.lag_force, found.band_force),
         "histogram": {"left": found.edges[:-1], "right": found.edges[1:], "top": found.counts},
         "normal": {"x": normal, "y": np.exp(-0.5 * normal**2) / math.sqrt(2.0 * math.pi)},
     }

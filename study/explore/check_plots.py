@@ -1,70 +1,14 @@
 """Panels of what shows a test of its kind and of the checks of the residual."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from typing import Any
 
 from bokeh.models import ColumnDataSource, Span
 
 from study.explore import theme
-from study.explore.check_columns import DRIVEN, FREE, PRESCRIBED
 
 Sources = Mapping[str, ColumnDataSource]
 HEIGHT = 228  # pixels
-
-
-@dataclass(frozen=True)
-class Check:
-    """A panel: its place, the words above it, and what they say to a mouse."""
-
-    name: str
-    heading: str
-    about: str = ""
-
-
-Card = tuple[Check, ...]
-PHASE = Check("phase", "… its phase")
-FUNCTIONS: Card = (
-    Check("frf", "Frequency response", "H1 of the judged part, of the record and of the model's free run under the "
-          "same force"), PHASE,
-    Check("linearity", "… coherence with the force", "below one in both: nonlinear; in the measured alone: noise, or "
-          "something missing"),
-)  # fmt: skip
-STIFFNESS: Card = (
-    Check("frf", "Dynamic stiffness", "force over displacement, of the record and of the model under the same motion"),
-    replace(PHASE, about="the loss angle"), replace(FUNCTIONS[2], heading="… its coherence"),
-)  # fmt: skip
-LOOPS: Card = (
-    Check("loop_u", "Force over displacement", "the loops of the judged part"), Check("loop_v", "… over velocity"),
-    Check("cycles", "… energy of a cycle", "the area of each loop, over its stroke"),
-)  # fmt: skip
-DECAY: Card = (
-    Check("decay_frequency", "Frequency over amplitude", "windows of the analytic signal, with 95 % intervals"),
-    Check("decay_damping", "… damping ratio"),
-)  # fmt: skip
-ITSELF = Check("autocorrelation", "Difference with itself", "a right model in white noise leaves nothing outside of "
-               "the band")  # fmt: skip
-DRIVE = Check("with_force", "… with the force", "a right model leaves nothing outside of the band, whatever the colour "
-              "of the noise")  # fmt: skip
-SPREAD = Check("histogram", "… its distribution", "σ: the standard deviation of the difference")
-CARDS: dict[str, tuple[Card, ...]] = {
-    DRIVEN: (FUNCTIONS, (ITSELF, DRIVE, SPREAD)),
-    PRESCRIBED: (LOOPS, STIFFNESS, (ITSELF, replace(DRIVE, heading="… with the displacement"), SPREAD)),
-    FREE: (DECAY, (ITSELF, SPREAD)),
-}  # of each kind of test
-
-
-def panels(s: Sources, frequency: Any, kind: str) -> dict[str, Any]:
-    """Those of a kind of test, by the name of their place."""
-    drawn: dict[str, Callable[[], Any]] = {
-        "frf": lambda: magnitude(s, frequency), "phase": lambda: phase(s, frequency),
-        "linearity": lambda: coherence(s, frequency), "loop_u": lambda: loop(s, "u"), "loop_v": lambda: loop(s, "v"),
-        "cycles": lambda: cycles(s), "decay_frequency": lambda: decay(s, "frequency", "frequency / Hz"),
-        "decay_damping": lambda: decay(s, "damping", "damping ratio / %"),
-        "autocorrelation": lambda: correlation(s, "autocorrelation", "autocorrelation / 1"),
-        "with_force": lambda: correlation(s, "with_force", "correlation / 1"), "histogram": lambda: histogram(s),
-    }  # fmt: skip
-    return {check.name: drawn[check.name]() for card in CARDS[kind] for check in card}
 
 
 def loop(s: Sources, of: str) -> Any:
@@ -122,7 +66,7 @@ def phase(s: Sources, frequency: Any) -> Any:
     return drawn
 
 
-def coherence(s: Sources, frequency: Any) -> Any:
+def linearity(s: Sources, frequency: Any) -> Any:
     """Ordinary coherence of force and response: below one in both, the system is nonlinear; in one, noise or a lack."""
     ranges = (frequency, theme.fixed("range_linearity", 0.0, 1.03))
     drawn = theme.panel("linearity", HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)

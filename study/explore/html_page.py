@@ -1,125 +1,120 @@
 """The page of a session: sources and panels put together, for a live document and for a saved one alike."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJS
+from bokeh.document import Document
+from bokeh.models import BasicTicker, ColumnDataSource, CustomJS, FixedTicker
+from jinja2 import Environment, FunctionLoader, Template
 
-from study.explore import any_page, check_plots, plots, theme
-from study.explore.any_page import Page
 from study.explore.axis_scales import Columns
-from study.explore.check_columns import FREE, PRESCRIBED, kind_of
-from study.explore.page_units import in_text
-from study.explore.placed_page import placed_columns, placed_page
-from study.explore.placed_view import PlacedView, placed_view
-from study.explore.session import Session, Stage
-from study.explore.view import View, view
+from study.explore.cards import cards_of, drawn
+from study.explore.session import Session
+from study.explore.view import View
+from study.explore.words import in_words
 
-Seen = View | PlacedView
-GHOSTS: dict[str, Columns] = {
+ROOT = "study"  # of a document
+ALWAYS = ("history", "response", "difference", "close", "constancy")  # panels of every page
+SCRIPTED: dict[str, Columns] = {  # what the page's script fills
     **{f"{kind}_{name}": {x: [], "y": []} for kind in ("ghost", "pinned")
        for name, x in (("time", "t"), ("spectrum", "f"), ("u", "at"), ("v", "at"))},
     "picked_spectrum": {"f": [], "y": []}, "picked_u": {"at": [], "y": []}, "picked_v": {"at": [], "y": []},
-    "shown": any_page.EMPTY,
+    "shown": {"f": [0.0, 1.0], "zero": [0.0, 0.0], **{n: [np.nan, np.nan] for n in ("value", "low", "high")}},
 }  # fmt: skip
-KINDS = {
+SELECTIONS = {
     "response": "time", "difference": "time", "force": "band", "coherence": "band", "spectrum": "band",
     "against_u": "u", "against_v": "v",
 }  # fmt: skip
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
-def seen_of(stage: Stage, step: int, live: bool = True, record: int = 0) -> Seen:
-    """What is drawn of a model, by its number in the session, on one of its records; only a ``live`` page can act."""
-    return placed_view(stage, step, live, record) if stage.model.named else view(stage, step, live, record)
+@dataclass(frozen=True)
+class Page:
+    """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template.
+
+    The document has one root, of which Bokeh draws nothing: the page's script draws the panels, those in view first.
+    """
+
+    sources: dict[str, ColumnDataSource]
+    panels: dict[str, Any]
+    further: list[Any]  # what no panel draws and the script reads
+
+    def put(self, columns: Mapping[str, Columns]) -> None:
+        """Draw other columns; the words come last, since the page begins anew when they change."""
+        for name in sorted(columns, key=lambda name: name == "words"):
+            self.sources[name].data = columns[name]
+
+    def root(self, diagnosed: bool) -> ColumnDataSource:
+        """What holds all of it; a page that nobody diagnoses has no place for the constancy of a coefficient."""
+        panels = [panel for name, panel in self.panels.items() if diagnosed or name != "constancy"]
+        return ColumnDataSource(name=ROOT, tags=[*panels, *self.sources.values(), *self.further])
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What the template takes from it: words, and the pixels kept free for each panel until it is drawn."""
+        words, place = self.sources["words"].data, self.sources["frame_place"].data
+        rows = zip(place["model"], place["property"], place["value"], strict=True)
+        said = dict(zip(words["place"], words["html"], strict=True)) | {n: x for n, p, x in rows if p == "html"}
+        return {"said": said, "heights": {name: panel.height for name, panel in self.panels.items()}}
+
+    def lay(self, document: Document, values: Mapping[str, Any]) -> None:
+        """Put panels, template and words into an empty document."""
+        document.add_root(self.root(values["diagnosed"]))
+        document.title, document.template = values["title"], template()
+        document.template_variables.update({**values, **self.given})
+        for source, called in (("words", "words"), ("turned", "settled")):
+            self.sources[source].js_on_change("data", CustomJS(code=f"window.study.{called}()"))
 
 
-def build(seen: Seen, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
-    """A page that shows one model, with the columns of its history; ``stores`` are further sources of its script."""
-    if isinstance(seen, PlacedView):
-        return placed_page(seen, history, stores)
-    t = seen.columns["time"]["t"]
-    time = theme.fixed("range_time", float(t[0]), float(t[-1]))
-    count = len(history["name"])
-
-    def draw(sources: plots.Sources, frequency: Any) -> dict[str, Any]:
-        return {
-            "response": plots.response(sources, time), "difference": plots.difference(sources, time),
-            "close": plots.close(sources),
-            "force": plots.force(sources, frequency, theme.fixed("range_force", *seen.limits)),
-            "coherence": plots.coherence(sources, frequency),
-            "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
-            "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
-            "history": plots.history(sources, history["name"], any_page.history_height(count)),
-            "constancy": plots.constancy(sources), **check_plots.panels(sources, frequency, seen.kind),
-        }  # fmt: skip
-
-    made = any_page.page_of({**columns(seen, history), **GHOSTS, "history": history}, _frequencies(seen), draw, stores)
-    for name, kind in KINDS.items():
-        made.panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": kind}, code=SELECTED))
-        made.panels[name].js_on_event("reset", CustomJS(code="window.study.clear()"))
-    return made
+def turned(sensor: str, place: str) -> Columns:
+    """Which sensor and which place the panels show."""
+    return {"sensor": [sensor], "place": [place]}
 
 
-def columns(seen: Seen, history: Columns) -> dict[str, Columns]:
-    """What a model gives the sources of a page."""
-    if isinstance(seen, PlacedView):
-        return placed_columns(seen, history)
-    return {**seen.columns, "frame": frame(seen, history)}
-
-
-def _frequencies(seen: View) -> tuple[float, float]:
-    """The lowest frequency in hertz that the panels draw, and the highest."""
-    return float(seen.columns["force"]["f"][0]), seen.highest
-
-
-def frame(seen: View, history: Columns) -> Columns:
-    """Labels and limits that differ from model to model, as settings of named models."""
-    scale, t = seen.scales, seen.columns["time"]["t"]
-    largest = max(float(np.nanmax(np.abs(seen.columns["plane"]["mean"]), initial=0.0)), seen.least)
-    u, v, f, y, d = (
-        in_text(s.unit) for s in (scale.displacement, scale.velocity, scale.force, scale.response, scale.difference)
-    )
-    labels = {
-        "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
-        "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
-        "against_v": f"missing force / {f}", "loop_u": f"force / {y}", "loop_v": f"force / {y}",
-        "cycles": f"energy / ({y} {u})",
-        "frf": f"stiffness / ({y}/{u})" if seen.kind == PRESCRIBED else f"magnitude / ({y}/{seen.force_unit})",
+def build(
+    view: View, session: Session, sensor: str, place: str, stores: Sequence[ColumnDataSource] = ()
+) -> Page:  # fmt: skip
+    """A page that shows one model, turned to a sensor and a place; ``stores`` are further sources of its script."""
+    columns = {
+        **view.of_record(session), **view.of_sensor(sensor), **view.of_place(place), "turned": turned(sensor, place),
+        **SCRIPTED,
     }  # fmt: skip
-    motions = {
-        **dict.fromkeys(("plane", "against_u", "loop_u"), f"displacement / {u}"),
-        **dict.fromkeys(("against_v", "loop_v"), f"velocity / {v}"), "cycles": f"stroke / {u}",
-        **dict.fromkeys(("decay_frequency", "decay_damping"), f"amplitude / {y}"),
-    }  # fmt: skip
-    rows: list[any_page.Row] = [
-        *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
-        *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
-        ("mapper", "low", -largest), ("mapper", "high", largest),
-        *any_page.time_rows(float(t[0]), float(t[-1])),
-        ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
-    ]  # fmt: skip
-    return any_page.frame(rows, _frequencies(seen), _log_axes(seen, history))
+    sources = {name: ColumnDataSource(data, name=name) for name, data in columns.items()}
+    cards = [card for part in cards_of(view.stage.comparison) for card in part]
+    panels = drawn([*ALWAYS, *(panel.name for card in cards for panel in card)], sources)
+    for name in SELECTIONS.keys() & panels.keys():
+        panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": SELECTIONS[name]}, code=SELECTED))
+        panels[name].js_on_event("reset", CustomJS(code="window.study.clear()"))
+    tickers = [
+        BasicTicker(name="frequency_even", desired_num_ticks=4),
+        FixedTicker(name="frequency_decades", ticks=[], minor_ticks=[]),
+    ]
+    return Page(sources, panels, [*stores, *tickers])
 
 
-def _log_axes(seen: View, history: Columns) -> dict[str, tuple[float, float]]:
-    """Ends of the logarithmic axes of what is drawn, by the panel."""
-    shown = {"force": seen.limits, "history": any_page.history_ends(history)}
-    drawn = {"spectrum": [("spectrum", "difference"), ("spectrum", "noise")]}
-    if seen.kind == FREE:
-        amplitudes = [("decay", "at"), ("decay_model", "at")]
-        drawn |= {"decay_frequency": amplitudes, "decay_damping": amplitudes}
-    else:
-        drawn["frf"] = [("frf", "measured"), ("frf", "predicted")]
-    for panel, sources in drawn.items():
-        values = np.concatenate([np.asarray(seen.columns[s][name], dtype=np.float64) for s, name in sources])
-        values = values[np.isfinite(values) & (values > 0.0)]
-        shown[panel] = (float(np.min(values)), float(np.max(values))) if len(values) else (1.0, 1.0)
-    return shown
+@cache
+def template() -> Template:
+    """The template of all pages."""
+    return Environment(autoescape=False, loader=FunctionLoader(_text)).get_template("page.html")
 
 
 def variables(session: Session, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
-    checks = () if session.now.model.named else check_plots.CARDS[kind_of(session.prepared)]
-    return {**any_page.variables(session, live), "several": bool(session.now.on_each), "checks": checks}
+    now = session.now
+    record, model = session.prepared.record.name, now.model.name
+    above, below = cards_of(now.comparison)
+    return {
+        "record": record, "model": model, "title": f"{record}: {model}", "live": live, "style": _text("page.css"),
+        "script": _text("page.js"), "several": bool(now.on_each), "places": now.model.named, "above": above,
+        "below": below, "sensors": [str(seen.sensor) for seen in now.comparison.views],
+        "steps": [f"{i} {in_words(stage.label)}" for i, stage in enumerate(session.stages)],
+        "diagnosed": live or any(stage.diagnosis is not None for stage in session.stages),
+    }  # fmt: skip
+
+
+def _text(name: str) -> str:
+    return files("study.explore").joinpath(name).read_text(encoding="utf-8")

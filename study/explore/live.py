@@ -8,70 +8,78 @@ from bokeh.document import Document
 from bokeh.events import RangesUpdate
 from bokeh.models import ColumnDataSource, CustomJS
 
-from study.explore import decimate, html_page, preview
-from study.explore.any_page import history_columns
-from study.explore.axis_scales import scales_of
+from study.explore import decimate, html_page
+from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
 from study.explore.desk import Desk
-from study.explore.session import Session, Stage, on_record
-from study.explore.view import over_time, stretch
+from study.explore.session import Session
+from study.explore.view import View, over_time, would_differ
 
 HELLO = "hello"  # what a page says when it is there
-RECORD = "record"  # what it asks for when another record is chosen
+RECORD, SENSOR, PLACE = "record", "sensor", "place"  # what it asks for when another one is chosen
 
 
 class Scene:
-    """A session in a document."""
+    """A session in a document, turned to one of the records, one of the sensors and one of the places."""
 
     def __init__(self, session: Session, stores: Sequence[ColumnDataSource]) -> None:
-        self.shown = session
-        self.record = worst(session.now.on_each)
-        self.page = html_page.build(self._view(), history_columns(session), stores)
+        self.shown, self.record = session, worst(session.now.on_each)
+        self.view = self._seen()
+        self.place = next(iter(self.view.places))
+        self.sensor = self.view.nearest(self.place)
+        self.page = html_page.build(self.view, session, self.sensor, self.place, stores)
         self.span: tuple[float, float] | None = None
 
     def lay(self, document: Document) -> None:
         """Put panels, template and words into an empty document."""
         self.page.lay(document, html_page.variables(self.shown, live=True))
-        if "response" in self.page.panels:
-            self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
+        self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
 
     def show(self, session: Session) -> None:
         """Draw another session."""
         self.shown = session
-        history = history_columns(session)
-        self.page.show(html_page.columns(self._view(), history), history)
+        self.view = self._seen()
+        if self.place not in self.view.places:
+            self.place = next(iter(self.view.places))
+        columns = {**self.view.of_sensor(self.sensor), **self.view.of_place(self.place), **self.view.of_record(session)}
+        self.page.put({"turned": html_page.turned(self.sensor, self.place), **columns})
         if self.span is not None:
             self._refine(self.span)
 
-    def turn_to(self, record: str) -> None:
-        """Show another of several records."""
-        records = [str(number) for number in range(len(self.shown.now.on_each))]
-        if record in records:
-            self.record, self.span = records.index(record), None
+    def turn_to(self, what: str, name: str) -> None:
+        """Show another record by its number, another sensor or place by its name."""
+        if what == RECORD and name in [str(number) for number in range(len(self.shown.now.on_each))]:
+            self.record, self.span = int(name), None
             self.show(self.shown)
+        if what == SENSOR and name in self.view.sensors:
+            self.sensor = name
+            self._turned(self.view.of_sensor(name))
+            if self.span is not None:
+                self._refine(self.span)
+        if what == PLACE and name in self.view.places:
+            self.place = name
+            self._turned(self.view.of_place(name))
 
-    def _view(self) -> html_page.Seen:
+    def _turned(self, columns: dict[str, Columns]) -> None:
+        self.page.put({**columns, "turned": html_page.turned(self.sensor, self.place)})
+
+    def _seen(self) -> View:
         stages = self.shown.stages
-        return html_page.seen_of(stages[-1], len(stages) - 1, record=self.record)
-
-    def _stage(self) -> Stage:
-        return on_record(self.shown.now, self.record)
+        return View(stages[-1], len(stages) - 1, record=self.record)
 
     def _zoomed(self, event: RangesUpdate) -> None:
         """Draw a stretch of a long record with the samples that the screen has room for."""
         first, last = event.x0, event.x1
-        if len(self._stage().comparison.prediction.time) <= 2 * decimate.BUCKETS:
+        if len(self.view.stage.comparison.prediction.time) <= 2 * decimate.BUCKETS:
             return
         if first is not None and last is not None and math.isfinite(last - first) and last > first:
             self._refine((first, last))
 
     def _refine(self, span: tuple[float, float]) -> None:
         self.span = span
-        stage = self._stage()
-        comparison, scales = stage.comparison, scales_of(stage.comparison)
-        part = stretch(comparison, span)
-        self.page.sources["would_time"].data = preview.difference(stage, scales, part)
-        self.page.sources["time"].data = over_time(comparison, scales, span)
+        focus = self.view.focus(self.sensor, self.place)
+        times = {"would_time": would_differ(focus, self.view.stage.shown, span), "time": over_time(focus, span)}
+        self.page.put(times)
 
 
 class Watcher:
@@ -123,9 +131,9 @@ class Watcher:
         act, name = (new[key][0] if new[key] else "" for key in ("act", "name"))
         if act == HELLO:  # what changed while the page was on its way is shown now
             self._show()
-        elif act == RECORD:
+        elif act in (RECORD, SENSOR, PLACE):
             self.document.hold("combine")
-            self.scene.turn_to(name)
+            self.scene.turn_to(act, str(name))
             self.document.unhold()
         elif isinstance(act, str) and isinstance(name, str):
             self.desk.ask(act, name)

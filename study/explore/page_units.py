@@ -38,6 +38,13 @@ def rate(unit: str, largest: float) -> Scale:
     return Scale(factor, shown + sign + rest)
 
 
+def motion(unit: str, largest: float) -> Scale:
+    """The scale of any motion, and of what is predicted in its place; angles take a power of 1000."""
+    if unit.startswith("rad"):
+        return power(unit, largest)
+    return rate(unit, largest) if "/" in unit else length(unit, largest)
+
+
 def power(unit: str, largest: float) -> Scale:
     """A power of 1000 before any unit, where numbers would begin with zeros or fill the axis with digits."""
     if EASY[0] <= largest < EASY[1]:

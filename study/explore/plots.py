@@ -1,7 +1,7 @@
 """The panels, each from named sources: a panel draws columns and knows nothing of where they come from."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 from bokeh.models import (
     ColorBar,
@@ -45,7 +45,7 @@ def difference(s: Sources, time: Any) -> Any:
     noise = drawn.multi_line("t", "level", source=s["noise"], **theme.NOISE)
     theme.chosen(drawn, "box_difference")
     theme.follows(drawn, [line, noise])
-    named = [("measured less predicted", [line]), ("± twice the noise", [noise])]
+    named = [("difference", [line]), ("± twice the noise", [noise])]
     theme.legend(drawn, [*named, ("candidate", [would]), ("pinned", [pinned])])
     return drawn
 
@@ -65,8 +65,9 @@ def _blocks(drawn: Any, s: Sources) -> None:
     drawn.add_glyph(s["blocks"], strips, level="underlay", nonselection_glyph=None)
 
 
-def force(s: Sources, frequency: Any, share: Any) -> Any:
-    """Unexplained share of the force with the noise floor."""
+def force(s: Sources, frequency: Any) -> Any:
+    """Unexplained share of the force with the noise floor; ends of its axis are set with its data."""
+    share = theme.fixed("range_force", 1.0, 100.0)
     drawn = theme.panel(
         "force", 240, "frequency / Hz", "unexplained share / %", select=True, ranges=(frequency, share),
         narrow=True, y_axis_type="log",
@@ -104,6 +105,47 @@ def spectrum(s: Sources, frequency: Any) -> Any:
     theme.chosen(drawn, "box_spectrum")
     theme.follows(drawn, [line, noise])
     theme.legend(drawn, [("difference", [line]), ("noise", [noise]), ("candidate", [would]), ("selected", [picked])])
+    return drawn
+
+
+def sensors(s: Sources) -> Any:
+    """Error of each sensor over its rms motion, beside what noise alone would leave."""
+    names = _names(s["sensors"], 0.1)
+    height = 74 + 24 * max(len(names.factors), 3)  # pixels
+    drawn = theme.panel("sensors", height, "error of the sensor / %", "", narrow=True, ranges=(None, names))
+    error = drawn.hbar(y="name", right="error", height=0.6, source=s["sensors"], fill_color="#e08a4a", line_color=None)
+    floor = drawn.hbar(y="name", right="floor", height=0.22, source=s["sensors"], fill_color=theme.INK, line_color=None)
+    drawn.x_range.start = 0.0
+    drawn.yaxis.major_label_text_color = theme.INK
+    theme.legend(drawn, [("error of the free run", [error]), ("noise floor", [floor])])
+    return drawn
+
+
+def _names(source: ColumnDataSource, padding: float) -> Any:
+    """The range of an axis with the names of a source from top to bottom."""
+    names = cast("list[str]", source.data["name"])[::-1]
+    return FactorRange(factors=names, name=f"range_{source.name}", range_padding=padding)
+
+
+def lacking(s: Sources, frequency: Any) -> Any:
+    """Density of the force that is missing at a place."""
+    drawn = theme.panel("lacking", 250, "frequency / Hz", "missing force", narrow=True, ranges=(frequency, None))
+    line = drawn.line("f", "force", source=s["lacking"], line_color=theme.ORANGE, line_width=1.5)
+    drawn.y_range.start = 0.0
+    theme.legend(drawn, [("missing at the place", [line])])
+    return drawn
+
+
+def stiffness(s: Sources, frequency: Any) -> Any:
+    """Real part of the dynamic stiffness of a connection, as measured and as the model has it."""
+    drawn = theme.panel("stiffness", 250, "frequency / Hz", "stiffness", narrow=True, ranges=(frequency, None))
+    look: dict[str, Any] = {"source": s["stiffness"], "line_color": theme.BLUE}
+    measured = drawn.line("f", "measured", **look, line_width=1.2)
+    band = drawn.segment("f", "low", "f", "high", **look, line_alpha=0.35)
+    model = drawn.line("f", "model", source=s["stiffness"], line_color=theme.INK, line_width=1.6, line_dash=[6, 3])
+    reach = drawn.line("f", "reach", source=s["stiffness"], line_alpha=0.0)  # what is badly measured leaves the panel
+    theme.follows(drawn, [model, reach])
+    theme.legend(drawn, [("measured, 95 %", [measured, band]), ("model", [model])])
     return drawn
 
 
@@ -168,12 +210,11 @@ def constancy(s: Sources) -> Any:
     return drawn
 
 
-def history(s: Sources, names: list[str], height: int) -> Any:
+def history(s: Sources, height: int) -> Any:
     """Error by model, one below the other, with the noise floor."""
     drawn = theme.panel(
-        "history", height, "held-out error / %", "", x_axis_type="log",
-        ranges=(None, FactorRange(factors=names[::-1], name="range_history", range_padding=0.15)),
-    )  # fmt: skip
+        "history", height, "held-out error / %", "", x_axis_type="log", ranges=(None, _names(s["history"], 0.15))
+    )
     drawn.x_range.range_padding = 0.08
     at: dict[str, Any] = {"y": "name", "source": s["history"]}
     floor = drawn.scatter(

@@ -19,7 +19,7 @@ DIFFERS = (
 OWN = "Error with coefficients of the record's own: far below the first, where the one model on all lacks something."
 
 
-def words(stage: Stage, shown: str, live: bool) -> dict[str, str]:
+def several_records(stage: Stage, shown: str, live: bool) -> dict[str, str]:
     """The fragments by their place; ``shown`` is the name of the record that the panels show. None of one record."""
     if not stage.on_each:
         return {}

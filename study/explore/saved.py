@@ -14,35 +14,43 @@ from study.compare.comparison import Comparison
 from study.diagnose.needless import Needless
 from study.diagnose.verdict import Diagnosis
 from study.explore import html_page
-from study.explore.any_page import ROOT, Page, history_columns, template
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
+from study.explore.html_page import ROOT, Page, template
 from study.explore.session import Session, begin_with, with_diagnosis, with_stage
+from study.explore.view import View
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first, where that misses most."""
-    history, first = history_columns(session), (len(session.stages) - 1, worst(session.now.on_each))
-    views = {
-        (number, record): html_page.seen_of(stage, number, live=False, record=record)
-        for number, stage in enumerate(session.stages)
+    views = [
+        View(stage, step, False, record)
+        for step, stage in enumerate(session.stages)
         for record in range(max(len(stage.on_each), 1))
-    }
-    stores = stored({place: html_page.columns(seen, history) for place, seen in views.items()}, history)
-    made = html_page.build(views[first], history, stores)
+    ]
+    last, worst_missed = len(session.stages) - 1, worst(session.now.on_each)
+    first = next(view for view in views if (view.step, view.record) == (last, worst_missed))
+    stores = [
+        ColumnDataSource(columns, name=f"{name}@{of}")
+        for of, given in ((of, given) for view in views for of, given in stored(view, session).items())
+        for name, columns in given.items()
+    ]
+    place = next(iter(first.places))
+    turns = len(views) > 1 or len(first.places) > 1 or len(first.sensors) > 1
+    made = html_page.build(first, session, first.nearest(place), place, stores if turns else ())
     return as_file(made, html_page.variables(session, live=False))
 
 
-def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Columns) -> list[ColumnDataSource]:
-    """What a saved page turns to: the columns of each stage, counted from 0, and record; nothing of a single one."""
-    many = 1 + max(stage for stage, _ in columns)
-    stores: list[ColumnDataSource] = []
-    for (stage, record), shown in columns.items() if len(columns) > 1 else ():
-        given = {**shown, "history": _marked(history, stage - many)}
-        stores += [ColumnDataSource(c, name=f"{name}@{stage}.{record}") for name, c in given.items()]
-    return stores
+def stored(view: View, session: Session) -> dict[str, dict[str, Columns]]:
+    """What a saved page turns to, by what it is of: a model on a record, with each of its sensors and places."""
+    of = f"{view.step}.{view.record}"
+    return {
+        of: view.of_record(session),
+        **{f"{of}.sensor.{sensor}": view.of_sensor(sensor) for sensor in view.sensors},
+        **{f"{of}.place.{place}": view.of_place(place) for place in view.places},
+    }
 
 
 def as_file(made: Page, values: Mapping[str, Any]) -> bytes:
@@ -70,13 +78,6 @@ def of_diagnosis(comparison: Comparison, diagnosis: Diagnosis, unneeded: tuple[N
     """The same of a comparison and its diagnosis, and the terms that the model does not need."""
     session = begin_with(comparison)
     return saved(with_stage(session, with_diagnosis(replace(session.now, unneeded=unneeded), diagnosis)))
-
-
-def _marked(history: Columns, place: int) -> Columns:
-    """The history with a larger dot where the page stands."""
-    size = [6.0] * len(history["size"])
-    size[place] = 10.0
-    return {**history, "size": size}
 
 
 def _in_script(content: object) -> str:

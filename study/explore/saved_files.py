@@ -25,7 +25,7 @@ def files(
     now = session.now
     model = now.model.with_values(now.values) if values else now.model
     for one in session.several.separate:  # terms that tell the records of this session apart belong to it alone
-        for term in [t.name for t in model.terms if set(t.term.symbols) & set(one.differences)]:
+        for term in [t.name for t in model.terms if set(t.symbols) & set(one.differences)]:
             model = model.without_term(term)
     shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
     steps = session.steps

@@ -13,7 +13,7 @@ import numpy as np
 
 from study.compare.comparison import Comparison, compare, on_each_record
 from study.compare.comparison_report import history_step
-from study.compare.missing_force import MissingForce, missing_force
+from study.compare.missing_force import Unbalanced, unbalanced
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import FittedCandidate, Progress
@@ -33,7 +33,7 @@ from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
-SHOWN, SHOWN_AT_PLACES = 8, 12  # candidates
+SHOWN = 12  # candidates
 NONE = Several()
 
 
@@ -47,8 +47,8 @@ class Stage:
     comparison: Comparison
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
-    # what a candidate would leave on each record, by its name; of a single mass, whose page shows it
-    would: Mapping[str, tuple[MissingForce, ...]] = field(default_factory=dict[str, tuple[MissingForce, ...]])
+    # what the equations would leave on each record with a candidate in the model, by its name
+    would: Mapping[str, tuple[Unbalanced, ...]] = field(default_factory=dict[str, tuple[Unbalanced, ...]])
     dropped: str | None = None  # the term that was taken out of the model before
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
     on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
@@ -56,10 +56,10 @@ class Stage:
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
-        """The candidates that a page lists: the best, and all of the user's own."""
+        """What a page lists: sets of effects, the best single ones, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
-        best = SHOWN_AT_PLACES if self.model.named else SHOWN
-        return (*rows[:best], *(r for r in rows[best:] if r.term.name not in LIBRARY))
+        sets = [r for r in self.diagnosis.sets if len(r.entries) > 1] if self.diagnosis is not None else []
+        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if r.term.name not in LIBRARY))
 
     @property
     def values(self) -> dict[str, float]:
@@ -143,7 +143,7 @@ def undone(session: Session) -> Session:
 def candidate(session: Session, name: str) -> Ranked:
     """The effect or set of this name in the present diagnosis, which must have one."""
     diagnosis = session.now.diagnosis
-    for row in (*diagnosis.sets, *diagnosis.candidates) if diagnosis is not None else ():
+    for row in (*diagnosis.candidates, *diagnosis.sets) if diagnosis is not None else ():
         if row.name == name:
             return row
     raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
@@ -174,8 +174,11 @@ def on_record(stage: Stage, number: int) -> Stage:
         return stage
     comparison, diagnosis = stage.on_each[number], stage.diagnosis
     if diagnosis is not None:
-        rows = [replace(r, prediction=r.prediction.along(comparison.prepared)) for r in diagnosis.candidates]
-        diagnosis = replace(diagnosis, candidates=tuple(rows))
+        candidates, sets = (
+            tuple(replace(row, prediction=row.prediction.along(comparison.prepared)) for row in rows)
+            for rows in (diagnosis.candidates, diagnosis.sets)
+        )
+        diagnosis = replace(diagnosis, candidates=candidates, sets=sets)
     would = {name: (lacking[number],) for name, lacking in stage.would.items()}
     return replace(stage, comparison=comparison, diagnosis=diagnosis, would=would)
 
@@ -226,18 +229,18 @@ def with_diagnosis(stage: Stage, diagnosis: Diagnosis) -> Stage:
 def _foreseen(stage: Stage) -> Stage:
     """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
     would = dict(stage.would)
-    for row in () if stage.model.named else stage.shown:
+    for row in stage.shown:
         if row.name not in would:
-            would[row.name] = tuple(_lacking_with(row, c) for c in stage.on_each or (stage.comparison,))
+            would[row.name] = tuple(_left_with(row, c) for c in stage.on_each or (stage.comparison,))
     return replace(stage, would=would)
 
 
-def _lacking_with(row: Ranked, comparison: Comparison) -> MissingForce:
-    """The force that the model with a candidate lacks on a record; what it lacks without if it cannot run."""
+def _left_with(row: Ranked, comparison: Comparison) -> Unbalanced:
+    """What the equations leave on a record with a candidate in the model; what they leave without if it cannot run."""
     try:
-        return missing_force(row.fit.model, (), row.prediction.along(comparison.prepared))
+        return unbalanced(row.fit.model, (), row.prediction.along(comparison.prepared))
     except StudyError:
-        return comparison.missing_force
+        return comparison.missing
 
 
 def with_stage(session: Session, stage: Stage) -> Session:
@@ -270,12 +273,6 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
     return term
 
 
-def _attempted(term: Term, session: Session) -> FittedCandidate | None:
-    """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
-    attempt = candidates.attempt(free(term), search_base(session.now.comparison))
-    return None if attempt is None else candidates.all_settled([attempt], session.prepared)[0]
-
-
 def tried(session: Session, text: str) -> Session:
     """The session with a formula of the user's among the candidates, fitted and ranked with them.
 
@@ -297,10 +294,10 @@ def tried(session: Session, text: str) -> Session:
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
-            attempt = _attempted(term, session)
+            attempt = candidates.attempt(free(term), search_base(now.comparison))
             if attempt is None:
                 raise StudyError(silent)
-            rows = rank([*known, attempt], now.comparison)
+            rows = rank([*known, *candidates.all_settled([attempt], session.prepared)], now.comparison)
     except np.linalg.LinAlgError:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))

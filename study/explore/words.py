@@ -3,29 +3,28 @@
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import Any
-
-import numpy as np
 
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
-from study.compare.force_map import FEWEST, surface
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.diagnose.verdict import MISSING, NOTHING, PARTLY, SEVERAL, Diagnosis
+from study.equations.coefficient_units import coefficient_unit
 from study.equations.linear_part import connections
-from study.equations.model import Model
-from study.equations.place import Place, place_in_words
+from study.equations.model import ModelTerm
+from study.equations.place import place_in_words
 from study.equations.terms import LIBRARY
-from study.explore.axis_scales import within
-from study.explore.page_units import Scale, in_percent, in_sentence, in_text, length, mass, number, rate, with_error
+from study.explore.page_units import Scale, in_percent, in_sentence, in_text, mass, motion, number, with_error
 from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
-VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
+VERDICTS = {
+    MISSING: "An effect is missing", SEVERAL: "Several effects are missing", NOTHING: "Nothing is missing",
+    PARTLY: "Effects are missing, and something that has no name",
+}  # fmt: skip
 UNKNOWN = "Something is missing that no candidate explains"
 WAITING = "Candidates are being tried …"
 NOT_ASKED = (
@@ -39,46 +38,24 @@ SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
 )
-READ = "a dash: below zero; a dot: may be noise"
 ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
 
 
-def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
-    """Every fragment of the model of a single mass, as columns ``place`` and ``html``."""
-    comparison = stage.comparison
-    fragments = shared_words(stage, rows, step, live) | {
-        "figures": _figures(comparison),
-        "equation": equation(stage),
-        "equation-values": equation(stage, values=True),
-        "only-noise": ONLY_NOISE if comparison.prediction.of(0).noise.alone else "",
-        "plane-hint": hint(comparison),
-        "force-unit": escape(in_text(force_unit)),
-    }
-    return {"place": list(fragments), "html": list(fragments.values())}
-
-
-def shared_words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool) -> dict[str, str]:
-    """The fragments that every page has, whether its coordinates have names or not."""
+def words(stage: Stage, step: int, live: bool) -> dict[str, str]:
+    """Every fragment of a model that does not hang on what the panels are turned to, by its place."""
     comparison, diagnosed = stage.comparison, live or stage.diagnosis is not None  # a live page diagnoses by itself
     return {
+        "figures": _figures(comparison),
         "says": escape(in_sentence(comparison_in_words(comparison, diagnosed))),
         "verdict": _verdict(stage, live),
-        "candidates": _candidates(stage, rows, live),
+        "candidates": _candidates(stage, live),
+        "equation": equation(stage),
+        "equation-values": equation(stage, values=True),
+        "only-noise": ONLY_NOISE if comparison.growths is None else "",
         "coefficients": _coefficients(stage, live),
         "notes": escape(in_sentence("; ".join(comparison.notes))),
-        "step": escape(name(stage, step)),
+        "step": escape(f"{step} {in_words(stage.label)}"),
     }
-
-
-def hint(comparison: Comparison) -> str:
-    """How to read the map of the missing force; or why there is none."""
-    plane = surface(*within(comparison.missing_force)).mean
-    return READ if np.any(np.isfinite(plane)) else f"no cell is visited {FEWEST} times: too short a record for a map"
-
-
-def name(stage: Stage, step: int) -> str:
-    """A model as the history names it."""
-    return f"{step} {in_words(stage.label)}"
 
 
 def in_words(label: str) -> str:
@@ -87,7 +64,12 @@ def in_words(label: str) -> str:
 
 
 def equation(stage: Stage, values: bool = False) -> str:
-    """The equation of motion with its symbols, or with the values of its coefficients in the units of the record."""
+    """The equation of motion with its symbols, or with the values of its coefficients in the units of the record.
+
+    None of a structure, which has several.
+    """
+    if stage.model.named:
+        return ""
     known = stage.values
     parts: list[str] = []
     for entry in stage.model.terms:
@@ -100,26 +82,27 @@ def equation(stage: Stage, values: bool = False) -> str:
 
 
 def _figures(comparison: Comparison) -> str:
-    size = comparison.prediction.error * comparison.prediction.of(0).size
-    scaled = length if comparison.plan.response == "displacement" else rate
-    shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
-    fit = in_percent(1.0 - comparison.prediction.error)
-    rms = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {fit}"
+    """The large numbers; of several sensors the worst is told, of one what its error is in its own unit."""
+    prediction, worst = comparison.prediction, comparison.worst
+    about = f"worst {in_percent(worst.error)} at {worst.sensor.coordinate}"
+    if len(comparison.views) == 1:
+        size = worst.error * worst.size
+        shown = motion(comparison.record.unit(worst.sensor), size)
+        about = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {in_percent(1.0 - worst.error)}"
+    unexplained = "of its power unexplained" if comparison.forces else "of the power of those of inertia"
     cells = (
-        ("error", "Error of the response", in_percent(comparison.prediction.error), rms, PREDICTED),
-        ("floor", "Noise floor", in_percent(comparison.prediction.floor), "what no model could explain", FLOOR),
-        ("force", "Error of the force", in_percent(comparison.force.total), "of its power unexplained", FORCE),
+        ("error", "Error of the response", in_percent(prediction.error), about, PREDICTED),
+        ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", FLOOR),
+        ("force", "Error of the force", in_percent(comparison.force_error), unexplained, FORCE),
     )
-    return "".join(
-        figure(key, title, value, about, f' title="{escape(meaning)}"') for key, title, value, about, meaning in cells
-    )
+    return "".join(_figure(*cell) for cell in cells)
 
 
-def figure(key: str, title: str, value: str, about: str, more: str = "") -> str:
+def _figure(key: str, title: str, value: str, about: str, meaning: str) -> str:
     """One of the large numbers, small enough for its place where it has many digits."""
     size = " class='long'" if len(value) > LONG else ""
     return (
-        f'<div class="figure" id="figure-{key}"{more}><span>{title}</span><b{size}>{value}</b>'
+        f'<div class="figure" id="figure-{key}" title="{escape(meaning)}"><span>{title}</span><b{size}>{value}</b>'
         f"<small>{escape(about)}</small></div>"
     )
 
@@ -131,19 +114,27 @@ def _verdict(stage: Stage, live: bool) -> str:
     return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(in_sentence(stage.said))}</p>"
 
 
-def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
-    if stage.diagnosis is None:
+def _candidates(stage: Stage, live: bool) -> str:
+    """The list of candidates: sets of effects that no one can tell apart, single effects, and what is not offered."""
+    diagnosis = stage.diagnosis
+    if diagnosis is None:
         return ""
-    offered = [(i, row) for i, row in enumerate(rows) if offers(stage.diagnosis, row)]
-    shown = {row.name for _, row in offered}
-    left = [in_words(row.name) for row in stage.diagnosis.candidates if row.name not in shown]
+    offered = {i: row for i, row in enumerate(stage.shown) if offers(diagnosis, row)}
+    shown = {row.name for row in offered.values()}
+    left = [in_words(row.name) for row in diagnosis.candidates if row.name not in shown]
     more = len(left)
     others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
     if stage.model.named:  # too many to name
-        more = stage.diagnosis.asked - len(offered)
+        more = diagnosis.asked - sum(len(row.entries) == 1 for row in offered.values())
         others, left = f"{more} more effects and places explain less, or no more than chance would", []
+    rows: list[str] = [HEAD] if offered else []
+    sets = tuple(row for row in diagnosis.sets if len(row.entries) > 1)
+    apart = "sets of effects, which this record cannot tell apart" if len(sets) > 1 else "set of effects"
+    for kind, those in ((apart, sets), ("single effects", diagnosis.candidates)):
+        own = [_row(i, row, _rank(row, those), stage, live) for i, row in offered.items() if row in those]
+        rows += [f"<li class='kind'>{kind}</li>" if sets and own else "", *own]
     rest = f"<li class='more'>{others}{escape(': ' + ', '.join(left)) if left else ''}</li>" if more > 0 else ""
-    return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
+    return f"<ol>{''.join(rows)}{rest}</ol>"
 
 
 def gives(row: Ranked) -> bool:
@@ -156,48 +147,65 @@ def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
     return row.term.name not in LIBRARY or (diagnosis.verdict != NOTHING and gives(row))
 
 
-def _row(number: int, row: Ranked, stage: Stage, live: bool) -> str:
+def _row(number: int, row: Ranked, rank: str, stage: Stage, live: bool) -> str:
+    """One row: an effect or a set of them, what it explains, and the words that are shown when it is pointed at."""
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} %"
-    words, formula = escape(in_words(row.term.name)), escape(in_text(row.term.formula))
-    meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
-    size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {in_text(row.unit)}"
-    found = f" Found in {escape(row.term.cause)}." if row.term.name in LIBRARY else ""
-    doubt = f" As fitted it is no physical effect: {escape(row.unphysical)}." if row.unphysical else ""
-    at, where, said, click = "", "", "", "; a click pins it beside another"
-    if stage.model.named:
-        said, click = f" {escape(place_in_words(row.entry.place))}", ""
-        where = f" <i>{escape(row.entry.place.label)}</i>"
-        at = f" data-row='{escape(row.name)}' data-at='{escape(_sketched(row.entry.place, stage.model))}'"
-    detail = (
-        f"<b>{words}</b>{said} <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
-        f"{100.0 * row.gain.error:.1f} %, error with it {in_percent(row.response_error)}. {escape(meaning)}.{found}"
-        f"{doubt}"
-    )
+    names = [_name(entry) for entry in row.entries]
+    shown = "".join(f"<b>{name}</b>{f' <i>{place}</i>' if place else ''}" for name, place in names)
+    spoken = ", ".join(" ".join(name).strip() for name in names)
+    place = row.effect.entry.place
+    # the sketch may have the ends of the place the other way round
+    sketched = next((known.label for known in connections(stage.model) if known.path == place.path), place.label)
+    at = f" data-at='{escape(sketched)}'" if place.label else ""
     return (
-        f"<li class='candidate'{at} data-candidate='{number}' data-label='{escape(_label(row, row.unit))}' "
-        f"tabindex='0' aria-label='{words}{said}, explains {explained}'><span class='rank'>{_rank(number, row, stage)}"
-        f"</span><span class='name' title='{words}{click}'><b>{words}</b>{where}</span>{_ties(row)}"
-        f"{bar(row.gain)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
+        f"<li class='candidate{' set' if len(names) > 1 else ''}' data-candidate='{number}' "
+        f"data-row='{escape(row.name)}'{at} "
+        f"data-label='{escape(_label(row))}' data-of='{' '.join(_name(row.effect.entry)).strip()}' tabindex='0' "
+        f"aria-label='{spoken}, explains {explained}'><span class='rank'>{rank}</span>"
+        f"<span class='name' title='{spoken}; a click pins it beside another'>{shown}</span>{_ties(row)}{bar(row.gain)}"
+        f"<span class='explained'>{explained}</span>{add}<small hidden>{_detail(row)}</small></li>"
     )
 
 
-def _sketched(place: Place, model: Model) -> str:
-    """The label under which the sketch has a place, whichever end comes first."""
-    return next((known.label for known in connections(model) if known.path == place.path), place.label)
+def _name(entry: ModelTerm) -> tuple[str, str]:
+    """An effect and its place in words."""
+    return escape(in_words(entry.term.name)), escape(entry.place.label)
 
 
-def _label(row: Ranked, unit: str) -> str:
-    """Label of the axis on which the candidate's coefficient is drawn."""
-    symbols = ", ".join(row.term.symbols)
+def _detail(row: Ranked) -> str:
+    """What is known of a candidate: formula and coefficient of each effect, what they explain, meaning and cause."""
+    effects: list[str] = []
+    for effect in row.effects:
+        (words, at), term = _name(effect.entry), effect.entry.term
+        unit = coefficient_unit(effect.entry, term.symbols[0], row.prediction.prepared.record)
+        size = f"{' ± '.join(with_error(effect.coefficient, 1.96 * effect.error))} {in_text(unit)}"
+        where = f" {escape(place_in_words(effect.entry.place))}" if at else ""
+        formula = escape(in_text(term.formula))
+        effects.append(f"<b>{words}</b>{where} <i>{formula}</i>, coefficient <em>{escape(size)}</em>")
+    said = f"{'; '.join(effects)}; {'explains' if len(effects) == 1 else 'together they explain'} "
+    said += f"{100.0 * row.gain.explained:z.1f} ± {100.0 * row.gain.error:.1f} %, error with "
+    said += f"{'it' if len(effects) == 1 else 'them'} {in_percent(row.response_error)}."
+    if len(effects) == 1:
+        said += f" {escape(row.term.meaning[0].upper() + row.term.meaning[1:])}."
+        said += f" Found in {escape(row.term.cause)}." if row.term.name in LIBRARY else ""
+    elif 0.0 < row.distance < math.inf:
+        said += f" That leaves more than the first by {number(row.distance, 2)} standard errors."
+    who = "it" if len(effects) == 1 else "one of them"
+    return said + (f" As fitted {who} is no physical effect: {escape(row.unphysical)}." if row.unphysical else "")
+
+
+def _label(row: Ranked) -> str:
+    """Label of the axis on which the candidate's coefficient is drawn; of a set, that which is known least."""
+    symbols = ", ".join(row.effect.entry.term.symbols)
     symbol = f"|{symbols}|" if "," in symbols else symbols
-    return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + unit)}"
+    return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + row.unit)}"
 
 
-def _rank(place: int, row: Ranked, stage: Stage) -> str:
-    """The place; a tie with the first is no place of its own."""
-    ties = next((r.tied_with for r in (stage.diagnosis.candidates if stage.diagnosis else ())), ())
-    return "=" if place and row.name in ties else str(place + 1)
+def _rank(row: Ranked, rows: Sequence[Ranked]) -> str:
+    """Its place among those of its kind; a tie with the first is no place of its own."""
+    place = rows.index(row)
+    return "=" if place and row.name in rows[0].tied_with else str(place + 1)
 
 
 def _ties(row: Ranked) -> str:

@@ -12,16 +12,18 @@ from study import cli, trials
 from study.compare import history
 from study.compare.comparison import Comparison, compare
 from study.compare.force_map import curve, surface
-from study.compare.links import links
+from study.compare.links import power_in_blocks, times_of_blocks, visits_in_blocks
 from study.diagnose.adding import added
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import any_page, decimate, page_units, saved_files, view, words
+from study.explore import decimate, page_units, saved_files, words
 from study.explore import session as sessions
+from study.explore.axis_scales import log_ticks
 from study.explore.desk import Desk
 from study.explore.saved import saved
 from study.explore.saved_files import PAGE, files
+from study.explore.view import View, history_columns
 from study.records.prepared import prepare_record
 from study.support.errors import StudyError
 
@@ -78,8 +80,7 @@ def test_who_has_the_diagnosis_is_not_sent_to_it(grown):
     assert grown.now.comparison.prediction.of(0).noise.alone
     asked = sessions.examined(grown)[0]
     for stage, live, sent in ((grown.now, False, True), (grown.now, True, False), (asked, False, False)):
-        said = words.words(stage, (), 1, live, "N")
-        assert ("looks closer" in dict(zip(*said.values(), strict=True))["says"]) == sent
+        assert ("looks closer" in words.words(stage, 1, live)["says"]) == sent
 
 
 def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(asked, grown):
@@ -127,13 +128,13 @@ def test_what_is_not_needed_has_a_button_that_takes_it_out(grown, superfluous):
     now = superfluous.now
     assert [n.name for n in now.unneeded] == ["quadratic_stiffness"]
     assert "Quadratic stiffness is not needed: without it" in now.said
-    places = dict(zip(*words.words(now, now.shown, 2, True, "N").values(), strict=True))
+    places = words.words(now, 2, True)
     assert re.findall(r"data-act='drop' data-name='(\w+)'", places["coefficients"]) == ["quadratic_stiffness"]
     assert "not needed" in places["coefficients"]
-    saved_ = dict(zip(*words.words(now, now.shown, 2, False, "N").values(), strict=True))["coefficients"]
+    saved_ = words.words(now, 2, False)["coefficients"]
     assert "not needed" in saved_
     assert "data-act" not in saved_
-    needed = dict(zip(*words.words(grown.now, (), 1, True, "N").values(), strict=True))["coefficients"]
+    needed = words.words(grown.now, 1, True)["coefficients"]
     assert "data-act='drop'" not in needed
 
 
@@ -147,7 +148,7 @@ def test_a_dropped_term_is_gone_and_undoing_brings_it_back(grown, superfluous):
     assert [history.label(s) for s in after.steps] == [
         "as given", "+ quadratic_damping", "+ quadratic_stiffness", "- quadratic_stiffness"
     ]  # fmt: skip
-    assert any_page.history_columns(after)["name"][-1] == "3 - quadratic stiffness"
+    assert history_columns(after)["name"][-1] == "3 - quadratic stiffness"
     assert sessions.undone(after) == superfluous
     model = model_file.format_model(grown.stages[0].model.with_term(get("quadratic_stiffness")))
     contents = files(after, "rig.yaml", f"# hall 3\n{model}")
@@ -189,7 +190,7 @@ def test_a_bad_formula_gets_its_sentence(asked, text, said):
 
 def test_links_add_up_to_the_curves_and_the_map(grown):
     comparison = grown.stages[0].comparison
-    tied, lacking = links(comparison), comparison.missing_force
+    tied, lacking = visits_in_blocks(comparison.missing_force), comparison.missing_force
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     for classes, values in ((tied.displacement, u), (tied.velocity, v)):
         visits, sums = classes.visits.sum(axis=0), classes.force.sum(axis=0)
@@ -199,16 +200,18 @@ def test_links_add_up_to_the_curves_and_the_map(grown):
     cells = tied.cells.sum(axis=0)
     assert np.all(cells[np.isfinite(surface(u, v, force).mean.ravel())] > 0)
     assert cells.sum() == pytest.approx(len(u), rel=0.01)
-    width = tied.frequency[1]
+    frequency, power = power_in_blocks(comparison.prediction.of(0))
     left = np.mean(comparison.prediction.residual**2)
-    assert tied.power.sum() * width / len(tied.power) == pytest.approx(left, rel=0.1)
+    assert power.sum() * frequency[1] / len(power) == pytest.approx(left, rel=0.1)
+    assert len(times_of_blocks(comparison.prediction)) == len(power) + 1 == len(tied.cells) + 1
 
 
 def test_what_a_candidate_would_leave_is_what_its_diagnosis_found(asked):
-    columns = view.view(asked.now, 0).columns
+    view = View(asked.now, 0)
+    columns = view.of_sensor("displacement") | view.of_place("")
     first = asked.now.diagnosis.candidates[0]
     shown = columns["would_time"]["0"]
-    scale = view.scales_of(asked.now.comparison).difference.factor
+    scale = view.focus("displacement", "").difference.factor
     assert np.allclose(shown * scale, first.residual, rtol=1e-5, atol=1e-12)
     with_it, without = (np.nanmax(np.abs(columns[a][b])) for a, b in (("would_v", "y0"), ("against_v", "mean")))
     assert with_it < 0.1 * without
@@ -218,7 +221,7 @@ def test_the_history_goes_on_where_the_file_left_it(begun):
     step = begun.steps[0]
     earlier = ({**step, "terms": ["inertia"]}, {**step, "added": "linear_damping"})
     assert len(replace(begun, earlier=earlier).steps) == 2
-    names = any_page.history_columns(replace(begun, earlier=earlier[:1]))["name"]
+    names = history_columns(replace(begun, earlier=earlier[:1]))["name"]
     assert names == ["0 as given", "1 as given"]
 
 
@@ -269,14 +272,16 @@ def test_the_missing_force_has_one_unit_everywhere(asked):
     record = comparison.record.with_channels({"force": comparison.record["force"] * factor})
     prepared = replace(comparison.prepared, record=record)
     lacking = replace(lacking, force=lacking.force * factor)
-    small = view.view(replace(stage, comparison=replace(comparison, prepared=prepared, missing_force=lacking)), 0)
-    usual = view.view(stage, 0)
-    assert usual.scales.force.factor == 1.0
-    assert small.scales.force.factor < 0.01
+    weak = replace(stage, comparison=replace(comparison, prepared=prepared, missing_force=lacking))
+    (small, scale), (usual, one) = (
+        (view.of_place(""), view.focus("displacement", "").force.factor) for view in (View(weak, 0), View(stage, 0))
+    )
+    assert one == 1.0
+    assert scale < 0.01
     for source, column in (("plane", "mean"), ("against_u", "mean"), ("against_v", "high")):
-        expected = usual.columns[source][column] * factor / small.scales.force.factor
-        assert small.columns[source][column] == pytest.approx(expected, rel=1e-4, nan_ok=True), source
-    heading = dict(zip(*small.columns["words"].values(), strict=True))["force-unit"]
+        expected = usual[source][column] * factor / scale
+        assert small[source][column] == pytest.approx(expected, rel=1e-4, nan_ok=True), source
+    heading = small["frame_place"]["value"][small["frame_place"]["model"].index("force-unit")]
     assert "10⁻" in heading
 
 
@@ -284,9 +289,30 @@ def test_ties_are_shown_as_ties(asked):
     rows = asked.now.diagnosis.candidates[:2]
     tied = (replace(rows[0], tied_with=(rows[1].name,)), replace(rows[1], tied_with=(rows[0].name,)))
     stage = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=tied))
-    html = dict(zip(*words.words(stage, tied, 0, True, "N").values(), strict=True))["candidates"]
+    html = words.words(stage, 0, True)["candidates"]
     assert re.findall(r"class='rank'>(.)<", html) == ["1", "="]
     assert html.count("class='tie'") == 2
+
+
+def test_a_set_of_effects_is_a_row_whose_click_adds_all_of_it(asked):
+    """Beside the single effects, which are counted by themselves; the preview is of the set."""
+    first, second = asked.now.diagnosis.candidates[:2]
+    both = replace(first, entries=first.entries + second.entries, effects=first.effects + second.effects, tied_with=())
+    diagnosis = replace(asked.now.diagnosis, verdict="missing_effects", sets=(both,))
+    stage = sessions.with_diagnosis(replace(asked.now, would={}), diagnosis)
+    assert [row.name for row in stage.shown[:2]] == [both.name, first.name]
+    assert both.name in stage.would
+    said = words.words(stage, 0, True)
+    head, row, *singles = re.findall(r"<li class='(?:kind|candidate)[^>]*>.*?</li>", said["candidates"])
+    assert "set of effects" in head
+    assert f"data-act='add' data-name='{both.name}'" in row
+    assert all(f"<b>{words.in_words(name)}</b>" in row for name in (first.name, second.name))
+    assert "together they explain" in row
+    assert "single effects" in singles[0]
+    assert [re.search(r"class='rank'>(.)<", html)[1] for html in (row, singles[1])] == ["1", "1"]
+    assert "Several effects are missing" in said["verdict"]
+    assert View(stage, 0).of_sensor("displacement")["would_time"].keys() == {str(i) for i in range(len(stage.shown))}
+    assert sessions.candidate(replace(asked, stages=(stage,)), both.name) is both
 
 
 def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
@@ -391,7 +417,7 @@ def test_bad_input_is_one_sentence_and_serves_nothing(words_, said, tmp_path, mo
     ("low", "high"), [(0.03, 0.8), (4.2, 7.9), (1e-5, 1e3), (0.9, 1.1e4), (1e-12, 1e-11), (2.0, 2.0)]
 )
 def test_ticks_of_a_logarithmic_axis_do_not_collide(low, high):
-    inside = [tick for tick in any_page.log_ticks(low, high) if low <= tick <= high]
+    inside = [tick for tick in log_ticks(low, high) if low <= tick <= high]
     apart = np.diff(np.log10(inside)) / max(np.log10(high / low), 1e-9)
     assert len(inside) <= 8
     assert len(inside) >= (2 if high > 1.5 * low else 0)
@@ -417,7 +443,7 @@ def test_numbers_have_one_format_on_the_page():
 
 def test_what_gives_nothing_is_counted_and_not_offered(asked):
     stage = asked.now
-    places = dict(zip(*words.words(stage, stage.shown, 0, True, "N").values(), strict=True))
+    places = words.words(stage, 0, True)
     offered = re.findall(r"data-candidate='(\d+)'", places["candidates"])
     assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.offers(stage.diagnosis, row)]
     assert 0 < len(offered) < len(stage.shown)
@@ -425,7 +451,7 @@ def test_what_gives_nothing_is_counted_and_not_offered(asked):
 
 
 def test_the_equation_stands_with_its_values_and_what_follows_from_them(grown):
-    places = dict(zip(*words.words(grown.now, (), 1, True, "N").values(), strict=True))
+    places = words.words(grown.now, 1, True)
     known = grown.now.values
     assert f"<b>{page_units.number(known['m'], 4)}</b> d²u/dt²" in places["equation-values"]
     f_n = np.sqrt(known["k"] / known["m"]) / (2.0 * np.pi)

@@ -16,10 +16,13 @@ from study.compare.residual_checks import residual_checks
 from study.compare.response_functions import response_functions
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import check_plots, page_units, view, words
+from study.explore import page_units, place_words
 from study.explore import session as sessions
+from study.explore.axis_scales import Focus
+from study.explore.cards import CHECKS
 from study.explore.check_columns import DRIVEN, FREE, PRESCRIBED, kind_of
 from study.explore.saved import saved
+from study.explore.view import View
 from study.records.record import Record
 from study.support.errors import StudyError
 from study.way_in.compare_records import compare_records
@@ -59,15 +62,17 @@ def _component() -> Record:
 @pytest.mark.parametrize("kind", [DRIVEN, PRESCRIBED, FREE])
 def test_a_page_shows_what_the_test_can_show(kind: str) -> None:
     session = begun(kind)
-    assert kind_of(session.prepared) == kind
+    assert kind_of(session.now.comparison) == kind
     text = saved(session).decode()
     shown = re.findall(r'data-panel="(\w+)"', text)
-    checks = {check.name for cards in check_plots.CARDS.values() for card in cards for check in card}
-    wanted = [check.name for card in check_plots.CARDS[kind] for check in card]
+    checks = {check.name for cards in CHECKS.values() for card in cards for check in card}
+    wanted = [check.name for card in CHECKS[kind] for check in card]
     assert [name for name in shown if name in checks] == wanted
-    columns = view.view(session.now, 0).columns
+    view = View(session.now, 0)
+    columns = view.of_record(session) | view.of_sensor(view.sensors[0]) | view.of_place("")
     for name, source in columns.items():
-        if name not in ("shown", "constancy", "would_time", "would_spectrum", "would_u", "would_v", "would_plane"):
+        if name not in ("constancy", "lacking", "stiffness", "would_time", "would_spectrum", "would_u", "would_v",
+                        "would_plane"):  # fmt: skip
             assert all(len(column) for column in source.values()), name
 
 
@@ -96,13 +101,14 @@ def test_a_component_shows_its_dynamic_stiffness() -> None:
     expected = STIFFNESS + 2j * np.pi * found.frequency * DAMPING
     moved = found.frequency < 12.0  # the motion has power up to 13.3 Hz
     assert np.all(np.abs(found.measured - expected)[moved] < 0.05 * np.abs(expected[moved]))
-    seen = view.view(begun(PRESCRIBED).now, 0)
-    scale = seen.scales.response.factor / seen.scales.displacement.factor
-    size = np.interp(seen.columns["frf"]["f"], found.frequency, np.abs(found.measured))
-    assert np.allclose(seen.columns["frf"]["measured"] * scale, size, rtol=1e-5)
-    loops = seen.columns["cycles"]
+    view = View(begun(PRESCRIBED).now, 0)
+    seen, focus = view.of_sensor("force"), view.focus("force", "")
+    scale = focus.response.factor / focus.displacement.factor
+    size = np.interp(seen["frf"]["f"], found.frequency, np.abs(found.measured))
+    assert np.allclose(seen["frf"]["measured"] * scale, size, rtol=1e-5)
+    loops = seen["cycles"]
     assert np.allclose(loops["predicted"], loops["measured"], rtol=0.2)
-    assert float(np.std(seen.columns["loops"]["u"])) * seen.scales.displacement.factor == pytest.approx(
+    assert float(np.std(seen["loops"]["u"])) * focus.displacement.factor == pytest.approx(
         float(np.std(comparison.record["displacement"])), rel=0.2
     )
 
@@ -115,9 +121,9 @@ def test_what_is_left_of_a_component_is_held_against_its_motion() -> None:
 
 def test_a_decay_shows_frequency_and_damping_by_amplitude() -> None:
     session = begun(FREE)
-    found, seen = decays_of(session.now.comparison), view.view(session.now, 0)
+    found, view = decays_of(session.now.comparison), View(session.now, 0)
     assert found is not None
-    shown = seen.columns["decay"]
+    shown = view.of_sensor(view.sensors[0])["decay"]
     assert np.all(np.diff(shown["at"]) >= 0.0)
     assert sorted(shown["frequency"]) == pytest.approx(sorted(found.measured.frequency), rel=1e-5)
     assert sorted(shown["damping"]) == pytest.approx(sorted(100.0 * found.measured.damping), rel=1e-5)
@@ -165,9 +171,11 @@ def test_a_map_has_cells_as_fine_as_the_record_allows() -> None:
 
 def test_a_map_that_stays_empty_says_why() -> None:
     comparison = begun(DRIVEN).now.comparison
-    assert words.hint(comparison) == words.READ
+    focus = Focus(comparison, 0, comparison.place)
+    assert place_words.one_place(focus, seen=True, tied=False)["plane-hint"] == place_words.READ
     lacking = comparison.missing_force
     few = slice(lacking.inner.start, lacking.inner.start + 3 * FEWEST)
     motion = {name: getattr(lacking, name)[few] for name in ("displacement", "velocity", "force")}
     short = replace(comparison, missing_force=replace(lacking, edge=0, **motion))
-    assert "too short a record" in words.hint(short)
+    hint = place_words.one_place(Focus(short, 0, short.place), seen=True, tied=False)["plane-hint"]
+    assert "too short a record" in hint

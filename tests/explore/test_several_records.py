@@ -17,12 +17,13 @@ from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
-from study.explore import decimate, saved_files, view
+from study.explore import decimate, saved_files
 from study.explore import session as sessions
 from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
 from study.explore.live import Watcher
 from study.explore.saved import saved
+from study.explore.view import View
 from study.records.excitation import Excitation, force
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.way_in.compare_records import compare_records
@@ -101,12 +102,13 @@ def test_what_a_candidate_would_leave_is_shown_record_by_record(grown):
         row = seen.diagnosis.candidates[0]
         end = begin + len(row.residual)
         assert np.array_equal(row.residual, first.residual[begin:end])
-        columns = view.view(stage, 0, record=number).columns
-        scale = view.scales_of(seen.comparison).difference.factor
+        view = View(stage, 0, record=number)
+        columns, said = view.of_sensor("displacement"), view.of_record(grown)["words"]
+        scale = view.focus("displacement", "").difference.factor
         drawn = columns["would_time"]["0"]
         assert len(drawn) == len(columns["time"]["t"])
         assert drawn[np.isfinite(drawn)] * scale == pytest.approx(row.residual, rel=1e-4, abs=1e-9)
-        assert dict(zip(*columns["words"].values(), strict=True))["of-record"] == f"of {name}"
+        assert dict(zip(*said.values(), strict=True))["of-record"] == f"of {name}"
         begin = end
     assert begin == len(first.residual)
 
@@ -149,8 +151,11 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
     assert contents["comparison.csv"].decode().count("\n") == 1 + len(NAMES)
     text = contents["explore.html"].decode()
     assert text == saved(grown).decode()
-    assert {f"time@{step}.{record}" for step in (0, 1) for record in (0, 1)} <= set(re.findall(r"time@\d\.\d", text))
-    names = [dict(zip(*view.view(s, 0).columns["words"].values(), strict=True))["records"] for s in grown.stages]
+    assert {f"time@{step}.{record}.sensor" for step in (0, 1) for record in (0, 1)} <= set(
+        re.findall(r"time@\d\.\d\.sensor", text)
+    )
+    said = [View(stage, 0).of_record(grown)["words"] for stage in grown.stages]
+    names = [dict(zip(*fragments.values(), strict=True))["records"] for fragments in said]
     assert [re.findall(r"data-name='(\d)' aria-pressed='true'", fragment) for fragment in names] == [["0"], ["0"]]
 
 
@@ -159,7 +164,7 @@ def test_a_page_that_was_made_ahead_of_its_visit_shows_what_was_done_since(grown
     watcher, document = Watcher(desk), Document()
     desk.session = grown
     watcher.lay(document)
-    said, known = document.template_variables["said"], view.view(grown.now, 1).columns["words"]
+    said, known = document.template_variables["said"], View(grown.now, 1).of_record(grown)["words"]
     assert said["figures"] == dict(zip(*known.values(), strict=True))["figures"]
     assert len(document.template_variables["steps"]) == 2
     assert watcher.state.data["undo"] == [True]

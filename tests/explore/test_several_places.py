@@ -1,4 +1,4 @@
-"""``study explore`` of a structure without a browser: the session, its columns and words, and what is saved."""
+"""``study explore`` of several sensors and places: the session, its columns and words, and what is saved."""
 
 import json
 import re
@@ -7,16 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bokeh.document import Document
 
 from study.compare import history
 from study.compare.comparison import compare
 from study.equations import model_file
 from study.explore import session as sessions
 from study.explore.desk import Desk
-from study.explore.html_page import seen_of
-from study.explore.placed_view import placed_view
+from study.explore.live import Watcher
 from study.explore.saved import saved
 from study.explore.saved_files import PAGE, files
+from study.explore.view import View
+from study.faults.fault import NOTHING_ASKED, FaultSettings
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
@@ -77,31 +79,85 @@ def test_a_term_at_a_place_is_dropped_and_a_value_held(begun, grown):
 
 
 def test_every_place_and_sensor_has_its_rows_and_each_source_columns_of_one_length(asked):
-    seen = placed_view(asked.now, 0)
-    for name, columns in seen.columns.items():
-        assert len({len(c) for c in columns.values()}) == 1, name
-    places = {link.place.label for link in seen.drawn.links}
-    assert set(seen.columns["all_map"]["of"]) <= places
-    assert "floor2-floor3" in set(seen.columns["all_map"]["of"]) & set(seen.columns["all_force"]["of"])
-    assert {"ground-floor1", "floor1-floor2", "floor2-floor3"} <= set(seen.columns["all_stiffness"]["of"])
-    assert set(seen.columns["all_motion"]["of"]) == set(seen.columns["sensors"]["name"])
-    assert CUBIC in seen.columns["all_constancy"]["of"]
+    view = View(asked.now, 0)
+    common, joints = view.of_record(asked), {"ground-floor1", "floor1-floor2", "floor2-floor3"}
+    assert next(iter(view.places)) == "floor2-floor3"
+    assert set(view.places) == joints | {"ground-floor2", "ground-floor3"}
+    assert set(view.sensors) == set(common["sensors"]["name"])
+    assert 0.0 in common["constancy"]["row"]
+    groups = [common, *map(view.of_sensor, view.sensors), *map(view.of_place, view.places)]
+    assert groups[1].keys() == groups[3].keys()
+    for columns in groups:
+        for name, source in columns.items():
+            if not name.startswith("would"):  # the script asks for what is there
+                assert len({len(c) for c in source.values()}) == 1, name
+    for label in view.places:
+        columns = view.of_place(label)
+        assert len(columns["lacking"]["f"]) > 5
+        said = dict(zip(columns["frame_place"]["model"], columns["frame_place"]["value"], strict=True))
+        assert (said["none-stiffness"] == "") == (label in joints), label
+
+
+def test_what_a_candidate_would_leave_is_shown_at_every_sensor_and_place(asked):
+    """The cubic stiffness that is missing, at its joint and in the motions of all floors."""
+    view, first = View(asked.now, 0), asked.now.diagnosis.candidates[0]
+    for number, sensor in enumerate(view.sensors):
+        columns, factor = view.of_sensor(sensor), view.focus(sensor, "floor2-floor3").difference.factor
+        left = first.prediction.of(number).residual
+        assert columns["would_time"]["0"] * factor == pytest.approx(left, rel=1e-4, abs=1e-9)
+        assert np.std(columns["would_time"]["0"]) < 0.7 * np.std(columns["time"]["difference"])
+    joint = view.of_place("floor2-floor3")
+    with_it, without = (np.nanmax(np.abs(joint[a][b])) for a, b in (("would_u", "y0"), ("against_u", "mean")))
+    assert with_it < 0.3 * without
+    assert set(joint["would_plane"]) == {str(i) for i in range(len(asked.now.shown))}
+
+
+def test_a_place_whose_motion_no_sensor_shows_says_so(hall):
+    model = model_file.read_model(hall / "frame.yaml")
+    record = read_record(hall / "frame.csv", roles=model.roles)
+    blind = record.with_motions({s: x for s, x in record.motions.items() if s.coordinate != "floor2"})
+    session = sessions.begin_with(compare(model, prepare_record(blind)))
+    view = View(session.now, 0)
+    assert view.sensors == ("floor1 displacement", "floor3 displacement")
+    for label, place in view.places.items():
+        columns = view.of_place(label)
+        said = dict(zip(columns["frame_place"]["model"], columns["frame_place"]["value"], strict=True))
+        seen = "floor2" not in place.moving
+        assert ("No sensor shows this motion" in said["none-plane"]) == (not seen), label
+    assert len(saved(session)) > 1e5
+
+
+def test_faults_of_the_measurement_are_corrected_and_said_or_left_alone(hall):
+    """A sensor that is read two samples late."""
+    model = model_file.read_model(hall / "frame.yaml")
+    record = read_record(hall / "frame.csv", roles=model.roles)
+    late = {s: np.roll(x, 2) if s.coordinate == "floor2" else x for s, x in record.motions.items()}
+    faulty = record.with_motions(late).part(10, len(record))
+    notes: list[str] = []
+    for settings in (FaultSettings(), NOTHING_ASKED):
+        session = sessions.begin_with(compare_records([faulty], model, settings=settings).comparison)
+        said = View(session.now, 0).of_record(session)["words"]
+        notes.append(dict(zip(*said.values(), strict=True))["notes"])
+    assert "floor2" in notes[0]
+    assert "late" in notes[0]
+    assert "late" not in notes[1]
 
 
 def test_the_dynamic_stiffness_of_a_joint_is_its_stiffness(grown):
     """Of the right model, in the band that the shaker moves."""
-    columns = placed_view(grown.now, 1).columns["all_stiffness"]
-    at = np.array([of == "floor1-floor2" for of in columns["of"]])
-    inside = at & (np.asarray(columns["f"]) > 3.0) & (np.asarray(columns["f"]) < 7.0)
+    columns = View(grown.now, 1).of_place("floor1-floor2")["stiffness"]
+    inside = (columns["f"] > 3.0) & (columns["f"] < 7.0)
     model, measured = (np.asarray(columns[n])[inside] for n in ("model", "measured"))
     assert np.all(model == model[0])
     assert np.median(measured) == pytest.approx(model[0], rel=0.15)
 
 
 def test_words_name_effect_and_place_and_only_a_live_page_has_buttons(asked):
-    live, still = (dict(zip(*placed_view(asked.now, 0, live=on).columns["words"].values(), strict=True))
-                   for on in (True, False))  # fmt: skip
-    first = re.search(r"<li class='candidate' data-row='([^']+)' data-at='([^']+)'", live["candidates"])
+    live, still = (
+        dict(zip(*View(asked.now, 0, live=on).of_record(asked)["words"].values(), strict=True)) for on in (True, False)
+    )
+    first = re.search(r"<li class='candidate' data-candidate='0' data-row='([^']+)' data-at='([^']+)'",
+                      live["candidates"])  # fmt: skip
     assert first is not None
     assert first.groups() == (CUBIC, "floor2-floor3")
     assert f"data-act='add' data-name='{CUBIC}'" in live["candidates"]
@@ -130,16 +186,41 @@ def test_several_records_of_a_structure_are_shown_one_by_one(hall):
     session = sessions.begin_with(compare_records(parts, model).comparison)
     assert [c.record.name for c in session.now.on_each] == ["first", "then"]
     for number, name in enumerate(("first", "then")):
-        seen = seen_of(session.now, 0, record=number)
-        said = dict(zip(*seen.columns["words"].values(), strict=True))
+        view = View(session.now, 0, record=number)
+        common, sensor = view.of_record(session), view.of_sensor(view.sensors[0])
+        said = dict(zip(*common["words"].values(), strict=True))
         assert said["of-record"] == f"of {name}"
         assert said["records"].count("data-act='record'") == 2
         judged = session.now.on_each[number].prediction
-        assert seen.columns["all_motion"]["t"][0] == pytest.approx(judged.time[0], abs=1e-3)
-        assert seen.columns["sensors"]["error"] == pytest.approx(100.0 * judged.errors, rel=1e-5)
+        assert sensor["time"]["t"][0] == pytest.approx(judged.time[0], abs=1e-3)
+        assert common["sensors"]["error"] == pytest.approx(100.0 * judged.errors, rel=1e-5)
         assert "data-place='floor2-floor3'" in said["places"]
     page = saved(session).decode()
-    assert {"words@0.0", "words@0.1", "all_map@0.1"} <= set(re.findall(r"\w+@\d\.\d", page))
+    stored = set(re.findall(r"\w+@\d\.\d[.\w -]*", page))
+    assert {"words@0.0", "words@0.1", "plane@0.1.place.floor2-floor3"} <= stored
+    assert "time@0.1.sensor.floor1 displacement" in stored
+
+
+def test_the_live_page_turns_to_the_sensor_and_the_place_that_are_asked_for(grown, hall, tmp_path):
+    desk = Desk(grown, hall / "frame.yaml", (hall / "frame.yaml").read_text(), tmp_path / "out")
+    watcher = Watcher(desk)
+    watcher.lay(Document())
+    page, seen = watcher.scene.page, [("", "", "")]
+    for count, (what, name) in enumerate((("place", "floor1-floor2"), ("sensor", "floor3 displacement"),
+                                          ("place", "floor9"), ("sensor", "floor9 displacement"))):  # fmt: skip
+        watcher.asked.data = {"act": [what], "name": [name], "count": [count]}
+        turned = page.sources["turned"].data
+        seen.append((*turned["sensor"], *turned["place"]))
+    assert seen[2:] == [("floor3 displacement", "floor1-floor2")] * 3
+    view = View(grown.now, 1)
+    for source, expected in (
+        ("time", view.of_sensor("floor3 displacement")), ("plane", view.of_place("floor1-floor2"))
+    ):  # fmt: skip
+        for name, column in expected[source].items():
+            assert np.array_equal(page.sources[source].data[name], column, equal_nan=True), (source, name)
+    watcher.scene.show(sessions.undone(grown))
+    assert page.sources["turned"].data["place"] == ["floor1-floor2"]
+    desk.close()
 
 
 @pytest.mark.long
