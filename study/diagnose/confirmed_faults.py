@@ -33,6 +33,7 @@ def diagnosed(
     record that is corrected for them is diagnosed, and the better of both diagnoses stands. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
+
     def found(one: Accounted) -> Diagnosed:
         diagnosis = diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Sequence
 
+from study.diagnose import verdict
 from study.diagnose.constancy import wavers
 from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import FittedEffect, Ranked
-from study.diagnose import verdict
 from study.diagnose.verdict import NOTHING, PARTLY, Diagnosis
+from study.equations.coefficient_units import coefficient_unit
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
-from study.equations.coefficient_units import coefficient_unit
 from study.figures.labels import term_names
 from study.support.numbers import by_chance, enumerated, percent
 from study.support.thresholds import ALPHA, UNSTEADY
@@ -93,8 +93,8 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     known = "are missing" if diagnosis.verdict != PARTLY else "are missing, and something beside them that has no name"
     said = [
         f"{effects[0].upper()}{effects[1:]} {known}.",
-        f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; the "
-        f"noise floor is {percent(answer.prediction.floor)}.",
+        f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "
+        f"the noise floor is {percent(answer.prediction.floor)}.",
         f"Their coefficients are {enumerated([_amount_of(e, answer) for e in answer.effects])}.",
     ]
     if diagnosis.left > 0.0:

@@ -9,6 +9,7 @@ import numpy as np
 from study.compare.prediction import Prediction
 from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
+from study.diagnose.credibility import reach_of
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.model import ModelTerm
@@ -32,6 +33,7 @@ class FittedEffect:
     parameter_errors: dict[str, float]  # their standard errors
     flatness: CoefficientCurve | None  # the coefficient along frequency
     steadiness: CoefficientCurve | None  # the coefficient along amplitude
+    idle: str  # why it does not act as itself along this motion, as a clause; empty where it does
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -112,6 +114,11 @@ class Ranked(FittedCandidate):
         return parameter_units(self.effect.entry, self.prediction.prepared.record) | {"phase": "rad"}
 
     @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted, or does not act as itself; empty if neither is so."""
+        return super().unphysical or next((effect.idle for effect in self.effects if effect.idle), "")
+
+    @property
     def residual(self) -> Floats:
         """Held-out residual, stacked."""
         return self.prediction.residual
@@ -154,12 +161,15 @@ def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)
     covariance = uncertainty(fit, prepared, jacobian)
-    effects = tuple(
-        FittedEffect(
-            entry, *amount(entry, fit.keys, fit.values, covariance), *curves(fit, entry, prepared.dt, jacobian)
-        )
-        for entry in candidate.entries
-    )
+    reach = reach_of(fit, prepared)
+
+    def effect(entry: ModelTerm) -> FittedEffect:
+        coefficient, error, parameters, errors = amount(entry, fit.keys, fit.values, covariance)
+        along = curves(fit, entry, prepared.dt, jacobian)
+        idle = reach.idle(entry.term, np.array(entry.place.direction(fit.model.coordinates)), parameters, errors)
+        return FittedEffect(entry, coefficient, error, parameters, errors, *along, idle)
+
+    effects = tuple(effect(entry) for entry in candidate.entries)
     return Ranked(
         candidate.entries, fit, candidate.prediction, effects,
         gain=statistics.gain(before.residual, candidate.prediction.residual), p_value=1.0,

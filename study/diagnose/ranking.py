@@ -43,7 +43,12 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
     white = {r.name: np.concatenate(r.held_out.white(outputs, noise)) for r in rows}
     alone = evidence(before, held_out_of(comparison))
     test = held_out_test(comparison.fit, before, noise)
-    rows = [replace(_gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, any(e.term.tuned for e in r.entries)))) for r in rows]
+    rows = [
+        replace(
+            _gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, any(e.term.tuned for e in r.entries)))
+        )
+        for r in rows
+    ]
     return in_order(rows, white, asked)
 
 

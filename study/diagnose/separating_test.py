@@ -77,8 +77,10 @@ def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
     if {e.place.path for e in rival.entries} != {e.place.path for e in rows[0].entries}:
         return separating_sensor(rows[0], rival)
     level = separating_level(rows[0], rival, prepared)
-    one, other = ([term_names(e.term.name) for e in row.entries if e.name not in without.names]
-                  for row, without in ((rows[0], rival), (rival, rows[0])))
+    one, other = (
+        [term_names(e.term.name) for e in row.entries if e.name not in without.names]
+        for row, without in ((rows[0], rival), (rival, rows[0]))
+    )
     names = f"{enumerated(one) or 'the smaller set'} and {enumerated(other) or 'the smaller set'}"
     if level is None:
         whole = prepared.response == "displacement"

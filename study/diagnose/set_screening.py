@@ -7,6 +7,7 @@ response biases it. In both a set is one small system of normal equations, and t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
@@ -34,7 +35,9 @@ class SetStart:
     beside: FittedCandidate | None = None  # the smaller set whose states it begins with; None for the model's own
 
 
-def best_subsets(columns: Mapping[str, Floats], target: Floats, sizes: Sequence[int]) -> dict[int, list[frozenset[str]]]:
+def best_subsets(
+    columns: Mapping[str, Floats], target: Floats, sizes: Sequence[int]
+) -> dict[int, list[frozenset[str]]]:
     """By size the sets whose columns explain most of a target, best first.
 
     Each is grown from one of the best with one effect less (a beam search: for two dozen effects the same as all sets).
@@ -53,7 +56,7 @@ def best_subsets(columns: Mapping[str, Floats], target: Floats, sizes: Sequence[
     design = design / length_or_one(design)
     gram, product = design.T @ design + COLLINEAR * np.eye(design.shape[1]), design.T @ target
     edges = np.cumsum([0, *(columns[name].shape[1] for name in names)])
-    own = [range(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    own = [range(a, b) for a, b in pairwise(edges)]
     beam: list[tuple[int, ...]] = [()]
     found: dict[int, list[frozenset[str]]] = {}
     for size in range(1, max(sizes) + 1):

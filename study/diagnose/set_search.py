@@ -55,8 +55,12 @@ class SetSearch:
         held = begun.held if start.model.modal else self.base.fit.held  # modes that damping does not couple stay so
         try:
             fit = fit_part(
-                start.model, prepared, [k for k in held if k in start.model.values], steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
-                max_iterations=TRIED, initial=grown_states(begun, start.model),
+                start.model,
+                prepared,
+                [k for k in held if k in start.model.values],
+                steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
+                max_iterations=TRIED,
+                initial=grown_states(begun, start.model),
             )
             return judged_candidate(tuple(e for n, e in self.entries.items() if n in start.names), fit, prepared)
         except StudyError:

@@ -30,7 +30,7 @@ from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
-from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, K
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
 MISSING, SEVERAL, PARTLY = "missing_effect", "missing_effects", "partly_known"
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
@@ -177,12 +177,11 @@ def _decide(
     explained = answer.gain.explained
     if (explained >= ENOUGH or left <= GOOD) and not answer.wanders(asked):
         return _Decision(kind, rows, left, sets)
-    if len(answer.entries) > 1 and explained >= NEARLY and not answer.unphysical:
-        return _Decision(kind, rows, left, sets)
     if len(answer.entries) == 1 and _stands_out(answer, comparison.prepared):
         return _Decision(kind, rows, left, sets)
-    if len(answer.entries) > 1 and explained >= MOST and not answer.unphysical:
-        return _Decision(PARTLY, rows, left, sets)
+    steady = not answer.unphysical and not answer.unsteadiness > UNSTEADY
+    if len(answer.entries) > 1 and steady and explained >= MOST:
+        return _Decision(kind if explained >= NEARLY else PARTLY, rows, left, sets)
     return _Decision(UNKNOWN, rows, left, sets)
 
 
@@ -223,6 +222,8 @@ def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
 
     Where these are both parts of a decay, the error of the judging part, which every table shows, falls as well.
     """
+    if row.unphysical:
+        return False
     without, with_it = evidence(prediction, own), evidence(row.prediction, row.held_out)
     if not alike(without, with_it):
         return credible(prediction, row.prediction, row.interval, row.p_value)
