@@ -159,9 +159,11 @@ def _decide(
         return _Decision(NOTHING, rows, left, [])
     complete = first is not None and (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
     alone = [] if first is None else [first, *(r for r in rows if r.name in first.tied_with)]
-    if first is not None and complete and first.unknowns <= 2:
+    # shapes of the motion see little of what is left in a drifting one: then a second effect is asked for all the same
+    plain = first is not None and (first.gain.explained >= ENOUGH or first.response_error <= GOOD)
+    if first is not None and complete and plain and first.unknowns <= 2:
         return _Decision(MISSING, rows, left, alone)
-    fewer_than = first.unknowns if first is not None and complete else None
+    fewer_than = first.unknowns if first is not None and complete and plain else None
     search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
