@@ -18,6 +18,7 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone, told_back
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra
@@ -39,6 +40,11 @@ def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Est
     StudyError
         If the model holds what the estimator finds, or the estimator does not find all that is open.
     """
+    if is_alone(model):
+        alone = model_alone(model)
+        fit, found = fit_by(name, alone, prepared_alone(prepared))
+        named = dict(zip(alone.values, model.values, strict=True))
+        return told_back(fit, model, prepared.outputs), replace(found, symbols=tuple(named[s] for s in found.symbols))
     held = [key for key in model.held_keys if "." not in key]
     if held:
         raise StudyError(

@@ -118,7 +118,7 @@ def _effect(told: str | Mapping[str, Any]) -> str:
     if isinstance(told, str):
         return term_names(told)
     kinds: tuple[Kind, ...] = ("at", "between", "couples")
-    ends = [(kind, told[kind]) for kind in kinds if kind in told]
+    ends: list[tuple[Kind, str | list[str]]] = [(kind, told[kind]) for kind in kinds if kind in told]
     where = [Place(kind, (end,) if isinstance(end, str) else tuple(end)) for kind, end in ends]
     return " ".join((term_names(told["term"]), *map(place_in_words, where)))
 

@@ -165,7 +165,7 @@ def compare(
     """
     report: Progress = progress or (lambda _: None)
     expect(
-        estimator == FREE_RUN or not model.named,
+        estimator == FREE_RUN or len(model.coordinates) == 1,
         f"--estimator {estimator} is for a single mass; expected {FREE_RUN} of a structure",
     )
     report("fit")

@@ -158,3 +158,12 @@ def test_a_structure_of_one_coordinate_is_compared_and_added_to_like_a_mass() ->
         for b, place in zip(before, (ALONE.terms[0].place, FROM_GROUND), strict=True)
     )
     assert other.error == pytest.approx(one.error, rel=1e-6)
+
+
+def test_an_estimator_of_the_users_choice_finds_the_same() -> None:
+    record = shaken()
+    one = compare(ALONE, prepare_record(record), estimator="local_polynomial")
+    other = compare(NAMED, prepare_record(named(record)), estimator="local_polynomial")
+    assert other.prediction.error == pytest.approx(one.prediction.error, rel=1e-6)
+    for a, b in zip(one.coefficients, other.coefficients, strict=True):
+        assert (b.value, b.error) == pytest.approx((a.value, a.error), rel=1e-6)
