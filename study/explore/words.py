@@ -95,7 +95,8 @@ def _figures(comparison: Comparison) -> str:
         ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", FLOOR),
         ("force", "Error of the force", in_percent(comparison.force_error), unexplained, FORCE),
     )
-    return "".join(_figure(*cell) for cell in cells)
+    told = cells if comparison.forces or comparison.missing.equations else cells[:-1]  # modes have no equation
+    return "".join(_figure(*cell) for cell in told)
 
 
 def _figure(key: str, title: str, value: str, about: str, meaning: str) -> str:

@@ -20,7 +20,7 @@ from study.equations.model import Model
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.explore import session as sessions
-from study.explore.placed_view import placed_view
+from study.explore.view import View
 from study.identify.frequency_domain.subspace import observability
 from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
@@ -304,10 +304,17 @@ def test_the_force_that_is_missing_between_two_coordinates_is_told_through_the_m
 
 
 def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_forces(comparison):
-    shown = placed_view(sessions.begin_with(comparison).now, 0)
-    words = dict(zip(shown.columns["words"]["place"], shown.columns["words"]["html"], strict=True))
-    assert "Error of the motions" in words["figures"]
-    assert "Error of the forces" not in words["figures"]
+    session = sessions.begin_with(comparison)
+    shown = View(session.now, 0)
+    table = shown.of_record(session)["words"]
+    words = dict(zip(table["place"], table["html"], strict=True))
+    assert "noise" in words["figures"].lower()
+    assert "Error of the force" not in words["figures"]
     assert words["modes"].count("<tr>") == 2 + len(comparison.modes.frequency)
-    assert len(shown.drawn.links) == 6, "each sensor to the ground, and each two"
-    assert len(shown.columns["all_motion"]["of"]) > 1000
+    assert shown.sketch is not None
+    assert len(shown.places) == len(shown.sketch.links) == 6, "each sensor to the ground, and each two"
+    for place in shown.places:
+        assert shown.focus(shown.nearest(place), place).place.label == place
+        assert len(shown.of_place(place)["against_u"]) > 0
+    assert all(len(shown.of_sensor(sensor)["time"]["t"]) > 1000 for sensor in shown.sensors)
+    assert not shown.stiffnesses
