@@ -77,7 +77,7 @@ def _diagnosed(
     from study.compare import each_record
     from study.compare.each_record import levels_by_record
     from study.diagnose import diagnosis_report
-    from study.diagnose.confirmed_faults import diagnosed
+    from study.diagnose.confirmed_faults import diagnose_accounted
     from study.diagnose.diagnosis_files import (
         diagnosis_files,
         diagnosis_in_words,
@@ -93,7 +93,7 @@ def _diagnosed(
         accounted = accounted_together(arguments, model, marked, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        found = diagnosed(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
+        found = diagnose_accounted(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
         diagnosis, accounted = found.diagnosis, found.accounted
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)

@@ -23,7 +23,7 @@ class Diagnosed:
     faults: tuple[Fault, ...]  # those that the record shows beside what is missing as well
 
 
-def diagnosed(
+def diagnose_accounted(
     accounted: Accounted, *, extra: Sequence[Term] = (), without: Sequence[str] = (), progress: Progress | None = None
 ) -> Diagnosed:
     """The diagnosis of a comparison, faults and effects asked for in the light of each other.
@@ -46,7 +46,7 @@ def diagnosed(
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
-        faults = accounted.beside(answer.fit, model)
+        faults = accounted.faults_beside(answer.fit, model)
         if same(faults, accounted.faults):
             return first
         again = found(accounted.corrected_for(faults))

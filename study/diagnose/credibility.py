@@ -55,7 +55,7 @@ def certain(before: HeldOutPrediction, after: HeldOutPrediction, interval: tuple
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class MotionRange:
     """How far a motion reaches that a model was fitted to; what an effect needs to act lies within."""
 
     motion: Floats  # displacement and velocity of each coordinate along the free run, shape (2, n, c)
@@ -99,8 +99,8 @@ class Reach:
                 return 0.0, float(np.max(np.abs(u)))
 
 
-def reach_of(fit: FreeRunFit, prepared: Prepared) -> Reach:
+def motion_range(fit: FreeRunFit, prepared: Prepared) -> MotionRange:
     """How far the free run of a fit reaches along the samples that it was fitted to."""
     motions = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in fit.model.coordinates)
     free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
-    return Reach(free.reshape(len(free), 2, -1).transpose(1, 0, 2), prepared.dt)
+    return MotionRange(free.reshape(len(free), 2, -1).transpose(1, 0, 2), prepared.dt)

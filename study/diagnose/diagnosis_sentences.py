@@ -7,7 +7,7 @@ from study.diagnose import verdict
 from study.diagnose.constancy import wavers
 from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import FittedEffect, Ranked
-from study.diagnose.verdict import NOTHING, PARTLY, Diagnosis
+from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
 from study.equations.coefficient_units import coefficient_unit
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
@@ -27,7 +27,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     match diagnosis.verdict:
         case verdict.MISSING:
             said = _missing(diagnosis)
-        case verdict.SEVERAL | verdict.PARTLY:
+        case verdict.SEVERAL | verdict.PARTLY_KNOWN:
             said = _several(diagnosis, diagnosis.sets[0])
         case _:
             said = _unknown(diagnosis)
@@ -90,7 +90,11 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     effects = enumerated([_with_alike(e.entry, diagnosis) for e in answer.effects])
-    known = "are missing" if diagnosis.verdict != PARTLY else "are missing, and something beside them that has no name"
+    known = (
+        "are missing"
+        if diagnosis.verdict != PARTLY_KNOWN
+        else "are missing, and something beside them that has no name"
+    )
     said = [
         f"{effects[0].upper()}{effects[1:]} {known}.",
         f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "

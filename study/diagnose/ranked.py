@@ -9,7 +9,7 @@ import numpy as np
 from study.compare.prediction import Prediction
 from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
-from study.diagnose.credibility import reach_of
+from study.diagnose.credibility import motion_range
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.model import ModelTerm
@@ -161,7 +161,7 @@ def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)
     covariance = uncertainty(fit, prepared, jacobian)
-    reach = reach_of(fit, prepared)
+    reach = motion_range(fit, prepared)
 
     def effect(entry: ModelTerm) -> FittedEffect:
         coefficient, error, parameters, errors = amount(entry, fit.keys, fit.values, covariance)

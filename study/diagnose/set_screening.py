@@ -71,7 +71,7 @@ def best_subsets(
     return found
 
 
-def beside(
+def by_sensitivities(
     parent: FittedCandidate | None, offered: Mapping[str, ModelTerm], base: Baseline, sizes: Sequence[int], most: int
 ) -> dict[int, list[SetStart]]:
     """By size the sets that promise most by the sensitivities at a fitted set, or at the model itself (None).

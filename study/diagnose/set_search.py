@@ -38,7 +38,7 @@ class SetSearch:
 
     def sets(self, size: int) -> list[FittedCandidate]:
         """Sets of so many effects that were fitted, the best first; those that are no physical effects come last."""
-        return sorted((c for names, c in self.tried.items() if len(names) == size), key=worse)
+        return sorted((c for names, c in self.tried.items() if len(names) == size), key=by_power)
 
     def fit(self, starts: Iterable[SetStart], progress: Callable[[int, int], None] | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
@@ -46,7 +46,7 @@ class SetSearch:
         for count, found in enumerate(side_by_side(self._fitted, listed), start=1):
             if found is not None:
                 names = frozenset(found.names)
-                self.tried[names] = min(found, self.tried.get(names, found), key=worse)
+                self.tried[names] = min(found, self.tried.get(names, found), key=by_power)
             if progress is not None:
                 progress(count, len(listed))
 
@@ -75,7 +75,7 @@ class SetSearch:
         return self.tried.get(fewer)
 
 
-def worse(candidate: FittedCandidate) -> tuple[bool, float]:
+def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
     """Order among sets of one size."""
     return bool(candidate.unphysical), candidate.power
 
@@ -100,13 +100,13 @@ def searched(
             break
         starts = list(reverse.get(size, ()))
         for parent in _parents(search.sets(size - 1), simple=fewer_than is not None):
-            starts += set_screening.beside(parent, offered, base, [size], EACH)[size]
+            starts += set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
         if size == 2:
-            starts += set_screening.beside(None, offered, base, [size], EACH)[size]
+            starts += set_screening.by_sensitivities(None, offered, base, [size], EACH)[size]
         report = None if progress is None else partial(progress, size)
         search.fit(starts, report)
         for parent in _parents(search.sets(size), simple=fewer_than is not None):  # one may change places with another
-            exchanged = set_screening.beside(parent, offered, base, [size], EACH)[size]
+            exchanged = set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
             search.fit([start for start in exchanged if start.names not in search.tried], report)
         larger = search.sets(size)
         if not larger or not gains(best, larger[0], len(starts)):

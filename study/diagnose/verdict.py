@@ -17,7 +17,7 @@ from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
-from study.diagnose.set_search import SetSearch, searched, worse
+from study.diagnose.set_search import SetSearch, by_power, searched
 from study.equations.linear_part import Modes, modes_of
 from study.equations.possible_effects import candidate_entries
 from study.equations.terms import Term
@@ -32,7 +32,7 @@ from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
-MISSING, SEVERAL, PARTLY = "missing_effect", "missing_effects", "partly_known"
+MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
@@ -54,7 +54,7 @@ class Diagnosis:
     @property
     def answer(self) -> Ranked | None:
         """The effect or the set of effects that is missing, the one that is known in part included."""
-        return self.sets[0] if self.verdict in (MISSING, SEVERAL, PARTLY) else None
+        return self.sets[0] if self.verdict in (MISSING, SEVERAL, PARTLY_KNOWN) else None
 
     @cached_property
     def included(self) -> dict[str, int]:
@@ -65,7 +65,7 @@ class Diagnosis:
     @cached_property
     def alike(self) -> dict[str, tuple[str, ...]]:
         """For each effect of the answer those that may stand in its place for all that this record tells."""
-        own = set() if self.answer is None else set(self.answer.names)
+        own = set[str]() if self.answer is None else set(self.answer.names)
         others = [set(row.names) for row in self.sets[1:] if len(row.names) == len(own)]
         return {
             name: tuple(sorted(next(iter(names - own)) for names in others if own - names == {name}))
@@ -103,7 +103,7 @@ def diagnose(
     families: list[FamilyGain] = []
     if decision.verdict == UNKNOWN:
         families = dependence.families(dependence.unexplained(base))
-    elif decision.verdict == PARTLY or (decision.verdict == SEVERAL and decision.left > GOOD):
+    elif decision.verdict == PARTLY_KNOWN or (decision.verdict == SEVERAL and decision.left > GOOD):
         families = dependence.families(dependence.left_by(decision.sets[0].fit, comparison.prepared))
     return Diagnosis(
         decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
@@ -183,14 +183,14 @@ def _decide(
         return _Decision(kind, rows, left, sets)
     steady = not answer.unphysical and not answer.unsteadiness > UNSTEADY
     if len(answer.entries) > 1 and steady and explained >= MOST:
-        return _Decision(kind if explained >= NEARLY else PARTLY, rows, left, sets)
+        return _Decision(kind if explained >= NEARLY else PARTLY_KNOWN, rows, left, sets)
     return _Decision(UNKNOWN, rows, left, sets)
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
     """Sets near the best in their order, settled as they would be if they were added."""
     alone = {row.name: row for row in rows}
-    every = sorted(search.tried.values(), key=worse)
+    every = sorted(search.tried.values(), key=by_power)
     best = every[0]
     near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:CLOSE]
     near += [c for names, c in search.tried.items() if c not in near and any(names < set(n.names) for n in near[:3])]

@@ -54,7 +54,7 @@ class Accounted:
     switched_off: tuple[str, ...]  # faults that are not looked for
     as_sampled: bool  # whether all samples are used
 
-    def beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
+    def faults_beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
         """The faults that the record shows beside a fuller model, which begins at a fit of it."""
         found = accounted(
             model, self.given, held=self.known, switched_off=self.switched_off, as_sampled=self.as_sampled, near=fit

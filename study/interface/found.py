@@ -192,5 +192,5 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
         result = diagnose_as_read(fit.comparison, extra=extra, without=tuple(without))
         return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))
     asked = replace(fit.asked, comparison=fit.comparison, faults=fit.faults)
-    found = confirmed_faults.diagnosed(asked, extra=extra, without=tuple(without))
+    found = confirmed_faults.diagnose_accounted(asked, extra=extra, without=tuple(without))
     return Diagnosis(found.diagnosis, found.faults, Words(diagnosis_in_words(found.diagnosis)))

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from study.diagnose.adding import added
-from study.diagnose.confirmed_faults import diagnosed
+from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.verdict import NOTHING, diagnose
 from study.equations.terms import LIBRARY
 from study.faults.fault import FAULTS, fault_fields
@@ -152,7 +152,7 @@ def table_of(order: Order) -> str:
 
 def _judged_driven(order: Order, trial: Trial) -> Row:
     begun = compared(trial, trial.completed if order.kind == COMPLETED else trial.believed)
-    found = diagnosed(begun, without=order.hidden or () if order.kind == REMOVED else ())
+    found = diagnose_accounted(begun, without=order.hidden or () if order.kind == REMOVED else ())
     diagnosis, before = found.diagnosis, found.diagnosis.comparison
     named = tie_set(diagnosis)
     together = diagnosis.answer.names if diagnosis.answer is not None and not named else ()
@@ -184,7 +184,7 @@ def _judged_test(_: Order, trial: Trial) -> Row:
 
     Of a record without noise nothing is asked: there an interval is as wide as rounding.
     """
-    diagnosis = diagnosed(compared(trial, trial.believed)).diagnosis
+    diagnosis = diagnose_accounted(compared(trial, trial.believed)).diagnosis
     named = tie_set(diagnosis)
     right = bool(named) and set(named) >= set(trial.hidden) if trial.hidden else diagnosis.verdict == NOTHING
     row: Row = {
@@ -229,7 +229,7 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
 def _judged_rig(_: Order, trial: Trial) -> Row:
     """Which set is named, whether it and each of its effects are the true ones, and whether the list has these."""
     unknown = str(trial.about.get("remainder", ""))
-    found = diagnosed(compared(trial, trial.believed), without=(unknown,) if unknown in LIBRARY else ())
+    found = diagnose_accounted(compared(trial, trial.believed), without=(unknown,) if unknown in LIBRARY else ())
     diagnosis, faults = found.diagnosis, [fault.fault for fault in found.faults]
     before, answer = diagnosis.comparison.prediction, diagnosis.answer
     named = () if answer is None else answer.names

@@ -79,7 +79,7 @@ def test_each_way_of_screening_names_the_two(two_effects):
     made, _, base, rows = two_effects
     offered = {r.name: next(t for t in r.fit.model.terms if t.name == r.name) for r in rows}
     for found in (
-        set_screening.beside(None, offered, base, [2], 1),
+        set_screening.by_sensitivities(None, offered, base, [2], 1),
         set_screening.by_the_reverse_system(offered, base, [2], 1),
     ):
         assert found[2][0].names == set(made.hidden)

@@ -138,6 +138,8 @@ def test_diagnose_writes_a_page_that_needs_no_server(given):
     text = (given / "e" / "explore.html").read_text()
     assert re.search(r"Tried there: .*cubic stiffness \(\d", blocks(text)["floor2-floor3"])
     assert "An effect is missing" in text
-    row = re.search(r"<li class='candidate' data-candidate='0' data-row='cubic_stiffness\[floor2-floor3\]'.*?</li>", text, re.DOTALL)
+    row = re.search(
+        r"<li class='candidate' data-candidate='0' data-row='cubic_stiffness\[floor2-floor3\]'.*?</li>", text, re.DOTALL
+    )
     assert row is not None
     assert "N/m³" in row[0]
