@@ -116,7 +116,12 @@ class Ranked(FittedCandidate):
     @property
     def unphysical(self) -> str:
         """Why it is no physical effect as fitted, or does not act as itself; empty if neither is so."""
-        return super().unphysical or next((effect.idle for effect in self.effects if effect.idle), "")
+        return super().unphysical or self.idle
+
+    @property
+    def idle(self) -> str:
+        """Why an effect does not act as itself along this motion; empty if all do."""
+        return next((effect.idle for effect in self.effects if effect.idle), "")
 
     @property
     def residual(self) -> Floats:

@@ -18,6 +18,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.part_fit import with_states
 from study.identify.time_domain.shape_search import Baseline, sensitivity
+from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
@@ -158,10 +159,11 @@ def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
     receptance, so that noise on the response weighs as it does in a free run.
     """
-    prepared = base.prepared
-    part, inputs = prepared.record.part(*prepared.inner(prepared.plan.fit)), reverse_inputs(model)
+    alone, prepared = model_alone(model), prepared_alone(base.prepared) if is_alone(model) else base.prepared
+    named = dict(zip(alone.values, model.values, strict=True))
+    part, inputs = prepared.record.part(*prepared.inner(prepared.plan.fit)), reverse_inputs(alone)
     if prepared.free:  # its inertia force is what the others have to balance
-        mass, inputs = float(model.values["m"] or 1.0), without_inertia(inputs)
+        mass, inputs = float(alone.values["m"] or 1.0), without_inertia(inputs)
         part = part.with_channels({"force": -mass * part["acceleration"]})
     taper = np.hanning(len(part) + 1)[:-1]
     frequency = np.asarray(rfftfreq(len(part), part.dt))
@@ -176,6 +178,6 @@ def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
         spectrum = np.asarray(rfft(taper * input_history(item, part)))[keep] * weight
         for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
             lines = spectrum * power
-            columns[k.symbol] = np.concatenate([lines.real, lines.imag])
+            columns[named[k.symbol]] = np.concatenate([lines.real, lines.imag])
     force = force[keep] * weight
     return columns, np.concatenate([force.real, force.imag])

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from study.diagnose import set_screening
-from study.diagnose.candidates import FittedCandidate, judged_candidate
+from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate
 from study.diagnose.set_screening import SetStart
 from study.equations.model import ModelTerm
 from study.identify.time_domain.fit_model import TRIED, grown_states
@@ -24,7 +24,6 @@ from study.support.thresholds import ALPHA
 
 MOST = 4  # effects in a set
 EACH = 6  # sets of a size that are fitted from one beginning
-Progress = Callable[[int, int, int], None]  # called with the size of the sets, how many were fitted, and of how many
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class SetSearch:
         """Sets of so many effects that were fitted, the best first; those that are no physical effects come last."""
         return sorted((c for names, c in self.tried.items() if len(names) == size), key=by_power)
 
-    def fit(self, starts: Iterable[SetStart], progress: Callable[[int, int], None] | None = None) -> None:
+    def fit(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
         listed = list(starts)
         for count, found in enumerate(side_by_side(self._fitted, listed), start=1):
@@ -103,7 +102,7 @@ def searched(
             starts += set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
         if size == 2:
             starts += set_screening.by_sensitivities(None, offered, base, [size], EACH)[size]
-        report = None if progress is None else partial(progress, size)
+        report = None if progress is None else partial(_counted, progress, len(search.tried))
         search.fit(starts, report)
         for parent in _parents(search.sets(size), simple=fewer_than is not None):  # one may change places with another
             exchanged = set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
@@ -118,6 +117,10 @@ def searched(
         for name in names:
             search.without(names, name)
     return search
+
+
+def _counted(progress: Progress, before: int, count: int, of: int) -> None:
+    progress(before + count, before + of)
 
 
 def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:

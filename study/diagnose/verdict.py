@@ -99,7 +99,7 @@ def diagnose(
     tried = candidates.try_all(entries, base, progress)
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    decision = _decide(rows, tried, base, comparison, asked)
+    decision = _decide(rows, tried, base, comparison, asked, progress)
     families: list[FamilyGain] = []
     if decision.verdict == UNKNOWN:
         families = dependence.families(dependence.unexplained(base))
@@ -145,8 +145,9 @@ class _Decision:
 
 
 def _decide(
-    rows: list[Ranked], tried: Sequence[FittedCandidate], base: Baseline, comparison: Comparison, asked: int
-) -> _Decision:
+    rows: list[Ranked], tried: Sequence[FittedCandidate], base: Baseline, comparison: Comparison, asked: int,
+    progress: Progress | None,
+) -> _Decision:  # fmt: skip
     """One effect that explains everything; else the set that does, as far as the record bears it."""
     prediction, own = comparison.prediction, held_out_of(comparison)
     trusted = [r for r in rows if believed(r, prediction, own)]
@@ -164,7 +165,7 @@ def _decide(
     if first is not None and complete and plain and first.unknowns <= 2:
         return _Decision(MISSING, rows, left, alone)
     fewer_than = first.unknowns if first is not None and complete and plain else None
-    search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than)
+    search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (complete and len(answer.entries) == 1):
@@ -181,7 +182,7 @@ def _decide(
         return _Decision(kind, rows, left, sets)
     if len(answer.entries) == 1 and _stands_out(answer, comparison.prepared):
         return _Decision(kind, rows, left, sets)
-    steady = not answer.unphysical and not answer.unsteadiness > UNSTEADY
+    steady = not (answer.unphysical or answer.unsteadiness > UNSTEADY or answer.wanders(asked))
     if len(answer.entries) > 1 and steady and explained >= MOST:
         return _Decision(kind if explained >= NEARLY else PARTLY_KNOWN, rows, left, sets)
     return _Decision(UNKNOWN, rows, left, sets)
@@ -224,7 +225,7 @@ def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
 
     Where these are both parts of a decay, the error of the judging part, which every table shows, falls as well.
     """
-    if row.unphysical:
+    if row.idle:
         return False
     without, with_it = evidence(prediction, own), evidence(row.prediction, row.held_out)
     if not alike(without, with_it):

@@ -9,7 +9,7 @@ from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, NOTHING, PARTLY, SEVERAL, Diagnosis
+from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, Diagnosis
 from study.equations.coefficient_units import coefficient_unit
 from study.equations.linear_part import connections
 from study.equations.model import ModelTerm
@@ -23,7 +23,7 @@ from study.support.thresholds import ALPHA
 
 VERDICTS = {
     MISSING: "An effect is missing", SEVERAL: "Several effects are missing", NOTHING: "Nothing is missing",
-    PARTLY: "Effects are missing, and something that has no name",
+    PARTLY_KNOWN: "Effects are missing, and something that has no name",
 }  # fmt: skip
 UNKNOWN = "Something is missing that no candidate explains"
 WAITING = "Candidates are being tried …"

@@ -122,7 +122,8 @@ def test_the_fields_are_those_of_the_file(of_drag):
 
 
 def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
-    first = replace(of_drag.candidates[0], error=1e-7 * abs(of_drag.candidates[0].coefficient))
+    first = of_drag.candidates[0]
+    first = replace(first, effects=(replace(first.effect, error=1e-7 * abs(first.coefficient)),))
     said = " ".join(diagnosis_sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:]))))
     low, high = re.search(r"95 % interval (\S+) to (\S+?)\)", said).groups()
     assert float(low) < first.coefficient < float(high)
@@ -131,7 +132,8 @@ def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
 
 @pytest.mark.parametrize("error", [np.inf, np.nan, 0.0])
 def test_an_interval_without_ends_is_said_all_the_same(of_drag, error):
-    first = replace(of_drag.candidates[0], error=error)
+    first = of_drag.candidates[0]
+    first = replace(first, effects=(replace(first.effect, error=error),))
     said = diagnosis_sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:])))
     assert any("95 % interval" in sentence for sentence in said)
 
@@ -254,7 +256,12 @@ def test_an_effect_of_a_decay_with_which_the_error_that_is_shown_grows_is_not_be
     evidence = {0.05: HeldOutResidual(np.ones(4), 0.05), shown: HeldOutResidual(np.ones(4), 0.04)}
     monkeypatch.setattr(verdict, "evidence", lambda prediction, _: evidence[prediction.error])
     row: Any = SimpleNamespace(
-        prediction=SimpleNamespace(error=shown), response_error=shown, held_out=None, interval=(1.0, 2.0), p_value=1e-6
+        prediction=SimpleNamespace(error=shown),
+        response_error=shown,
+        held_out=None,
+        interval=(1.0, 2.0),
+        p_value=1e-6,
+        idle="",
     )
     before: Any = SimpleNamespace(error=0.05)
     own: Any = None

@@ -128,7 +128,7 @@ def test_the_response_that_is_asked_for_is_compared():
 def test_what_a_measured_linear_part_cannot_use_is_refused():
     record = of_two(force(RANDOM, SAMPLES, DT, 1))
     for layout in (Layout(alternate=True), Layout(use=((1.0, 90.0),))):
-        with pytest.raises(StudyError, match=r"as measured.*one long stretch; expected --fit A:B"):
+        with pytest.raises(StudyError, match=r"sum of modes.*one long stretch; expected --fit A:B"):
             laid_out([record], layout, KindOfTest(unbroken=True))
 
 
