@@ -1,0 +1,142 @@
+"""Faults of the measurement and missing effects are asked for in the light of each other; no record is fitted here."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from study.diagnose import confirmed_faults
+from study.diagnose.confirmed_faults import diagnose_accounted, same
+from study.faults.fault import Fault
+from study.support.errors import StudyError
+from study.support.thresholds import TOLERANCE
+
+
+def delay(value: float, error: float = 0.01, **options: Any) -> Fault:
+    return Fault("delay", "displacement", value, error, **options)
+
+
+OFFSET = Fault("offset", "displacement", 1e-3, 1e-5)
+NOISE = Fault("force_noise", "force", 1.0, 0.1)
+
+
+def test_faults_are_the_same_by_their_errors():
+    assert same([], [])
+    assert same([delay(1.0)], [delay(1.02)])
+    assert not same([delay(1.0)], [delay(1.06)])
+    assert same([delay(1.0)], [delay(1.06, error=0.03)])  # either error counts
+    assert same([delay(1.0), OFFSET], [OFFSET, delay(1.0)])
+
+
+def test_other_faults_are_not_the_same():
+    assert not same([delay(1.0)], [])
+    assert not same([], [delay(1.0)])
+    assert not same([delay(1.0)], [delay(1.0), OFFSET])
+    assert not same([delay(1.0)], [Fault("delay", "velocity", 1.0, 0.01)])
+
+
+def test_what_is_only_named_makes_no_difference():
+    assert same([NOISE], [])
+    assert same([delay(1.0), NOISE], [delay(1.0)])
+    assert same([delay(1.0, rivals=("relaxation",))], [])
+
+
+class Model:
+    """A model that knows the names of its terms."""
+
+    def __init__(self, *names: str):
+        self.names = names
+
+    def with_term(self, entry: str) -> "Model":
+        return Model(*self.names, entry)
+
+
+class Corrected:
+    """A record that is corrected for faults, and the faults that it shows beside a fuller model."""
+
+    def __init__(self, faults: Sequence[Fault], beside: Sequence[Fault] | StudyError):
+        self.faults, self.beside = tuple(faults), beside
+        self.comparison = SimpleNamespace(model=Model("inertia"))
+        self.asked: list[tuple[str, ...]] = []
+
+    def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
+        self.asked.append(model.names)
+        if isinstance(self.beside, StudyError):
+            raise self.beside
+        return tuple(self.beside)
+
+    def corrected_for(self, faults: Sequence[Fault]) -> "Corrected":
+        return Corrected(faults, ())
+
+
+def diagnosed(
+    monkeypatch: pytest.MonkeyPatch, record: Any, *found: tuple[tuple[str, ...], float, float]
+) -> tuple[Any, int]:
+    """What comes out, and how many diagnoses were made; ``found`` are the effects of each, what is left, the error."""
+    made: list[tuple[str, ...]] = []
+
+    def diagnosis(*_: Any, **__: Any) -> Any:
+        names, left, error = found[len(made)]
+        made.append(names)
+        answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
+        return SimpleNamespace(answer=answer, left=left)
+
+    monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
+    monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
+    return diagnose_accounted(record), len(made)
+
+
+SET, ONE = ("cubic_stiffness", "coulomb_friction"), ("cubic_stiffness",)
+
+
+def test_a_record_is_corrected_anew_where_it_shows_other_faults_beside_the_set(monkeypatch: pytest.MonkeyPatch):
+    late = delay(1.0)
+    record = Corrected([OFFSET], beside=[late])
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05), (SET, 0.0, 0.02))
+    assert made == 2
+    assert record.asked == [("inertia", *SET)]
+    assert found.accounted.faults == found.faults == (late,)
+    assert found.diagnosis.answer.response_error == 0.02
+
+
+@pytest.mark.parametrize("again", [(SET, 0.0, 0.06), ((), 0.0, 0.0)])
+def test_the_better_of_both_diagnoses_stands(monkeypatch: pytest.MonkeyPatch, again: Any):
+    record = Corrected([OFFSET], beside=[delay(1.0)])
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05), again)
+    assert made == 2
+    assert found.accounted is record
+    assert found.diagnosis.answer.response_error == 0.05
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "faults"),
+    [
+        ((), 0.1, [OFFSET]),  # nothing beside which to ask
+        (ONE, TOLERANCE, [OFFSET]),  # one effect leaves nothing
+        (SET, TOLERANCE, []),  # a set leaves nothing, and nothing was corrected that it may have imitated
+    ],
+)
+def test_faults_are_not_asked_for_again_where_there_is_no_reason_to(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], left: float, faults: list[Fault]
+):
+    record = Corrected(faults, beside=[delay(1.0)])
+    found, made = diagnosed(monkeypatch, record, (names, left, 0.05))
+    assert made == 1
+    assert not record.asked
+    assert found.accounted is record
+
+
+@pytest.mark.parametrize(("names", "left"), [(ONE, 2.0 * TOLERANCE), (SET, 0.0)])
+def test_the_same_faults_beside_it_change_nothing(monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], left: float):
+    record = Corrected([delay(1.0)], beside=[delay(1.01)])
+    found, made = diagnosed(monkeypatch, record, (names, left, 0.05))
+    assert len(record.asked) == made == 1
+    assert found.accounted is record
+
+
+def test_where_the_fuller_model_cannot_be_asked_the_first_diagnosis_stands(monkeypatch: pytest.MonkeyPatch):
+    record = Corrected([OFFSET], beside=StudyError("no finite motion"))
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05))
+    assert made == 1
+    assert found.accounted is record

@@ -1,0 +1,68 @@
+"""Which sets of effects are worth a fit: what the search over columns finds is what trying every set finds."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from study.diagnose import set_screening
+from study.diagnose.set_screening import best_subsets
+from study.support.arrays import Floats
+
+SIZES = (1, 2, 3, 4)
+WIDTHS = {"a": 1, "b": 2, "c": 1, "d": 1, "e": 3, "f": 1, "g": 1}  # an effect of any phase has two columns
+
+
+def columns_of(rng: np.random.Generator) -> dict[str, Floats]:
+    shared = rng.normal(size=(80, 1))  # effects resemble each other
+    return {name: rng.normal(size=(80, width)) + 0.8 * shared for name, width in WIDTHS.items()}
+
+
+def explained(columns: dict[str, Floats], names: tuple[str, ...], target: Floats) -> float:
+    design = np.hstack([columns[name] for name in names])
+    left = target - design @ np.linalg.lstsq(design, target, rcond=None)[0]
+    return float(target @ target - left @ left)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_sets_are_those_of_exhaustive_enumeration_in_their_order(seed: int):
+    rng = np.random.default_rng(seed)
+    columns, target = columns_of(rng), rng.normal(size=80)
+    found = best_subsets(columns, target, SIZES)
+    for size in SIZES:
+        every = sorted(combinations(columns, size), key=lambda names: -explained(columns, names, target))
+        assert found[size] == [frozenset(names) for names in every]
+
+
+def test_effects_that_explain_only_together_are_found():
+    rng = np.random.default_rng(4)
+    columns, apart = columns_of(rng), rng.normal(size=80)
+    columns["c"] = columns["d"] + 0.01 * apart[:, None]  # their difference is the target, and neither resembles it
+    found = best_subsets(columns, apart, (1, 2))
+    assert found[1][0] not in ({"c"}, {"d"})
+    assert found[2][0] == {"c", "d"}
+
+
+def test_the_size_of_a_column_does_not_matter():
+    rng = np.random.default_rng(5)
+    columns, target = columns_of(rng), rng.normal(size=80)
+    scaled = {name: 10.0 ** (6 * (i % 3) - 6) * column for i, (name, column) in enumerate(columns.items())}
+    assert best_subsets(scaled, target, (3,)) == best_subsets(columns, target, (3,))
+
+
+def test_the_same_column_twice_explains_no_more_than_once():
+    rng = np.random.default_rng(6)
+    columns, target = columns_of(rng), rng.normal(size=80)
+    first = next(iter(best_subsets(columns, target, (1,))[1][0]))
+    best = best_subsets({**columns, "again": columns[first]}, target, (2,))[2][0]
+    assert best != {first, "again"}
+
+
+def test_a_narrow_beam_still_begins_with_the_best(monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(7)
+    columns = columns_of(rng)
+    target = columns["a"][:, 0] + 2.0 * columns["d"][:, 0] - columns["g"][:, 0]
+    monkeypatch.setattr(set_screening, "BEAM", 5)
+    found = best_subsets(columns, target, (3,))[3]
+    assert len(found) == 5
+    assert found[0] == {"a", "d", "g"}

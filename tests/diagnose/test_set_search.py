@@ -1,0 +1,215 @@
+"""The path of the search over sets of effects, on a table of what each set leaves: nothing is fitted here."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import combinations
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study.diagnose import set_screening, set_search
+from study.diagnose.set_screening import SetStart
+from study.diagnose.set_search import SetSearch, gains, searched
+from study.support.arrays import Floats
+
+N = 4800
+NAMES = "abcdef"
+UNKNOWNS = {"f": 3}  # an effect with a shape of its own; the others have one coefficient
+RNG = np.random.default_rng(11)
+NOISE = RNG.normal(size=2 * N)
+SHAPES = {name: RNG.normal(size=2 * N) for name in NAMES}
+Leaves = Callable[[frozenset[str]], Mapping[str, float]]
+
+
+def left_by(amounts: Mapping[str, float]) -> Floats:
+    return NOISE + sum((a * SHAPES[name] for name, a in amounts.items()), np.zeros(2 * N))
+
+
+def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: str = "") -> Any:
+    """A set as fitted, of which these amounts are left."""
+    chosen, left = tuple(sorted(names)), left_by(amounts)
+    unknowns = sum(UNKNOWNS.get(name, 1) for name in chosen)
+    model = SimpleNamespace(
+        terms=[SimpleNamespace(name=name) for name in chosen],
+        without_term=lambda name: SimpleNamespace(without=name),
+    )
+    record = SimpleNamespace(stretches=())
+    return SimpleNamespace(
+        names=chosen, name=" + ".join(chosen), entry=SimpleNamespace(name=chosen[0]), unknowns=unknowns,
+        flexible=unknowns > len(chosen), unphysical=unphysical, power=float(np.mean(left**2)),
+        fit=SimpleNamespace(model=model, residual=left[:N]),
+        prediction=SimpleNamespace(residual=left[N:], prepared=SimpleNamespace(record=record)),
+    )  # fmt: skip
+
+
+class Bench:
+    """A search whose fits come from a table, and whose screening proposes what a test says."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, leaves: Leaves):
+        self.leaves = leaves
+        self.fitted: list[tuple[str, str | None]] = []  # each set, and the smaller one that it began beside
+        self.asked: list[tuple[str | None, int]] = []  # sets beside which others were asked for, and of which size
+        self.proposed: Callable[[frozenset[str], int], Sequence[Iterable[str]]] = self.every
+        monkeypatch.setattr(SetSearch, "_fitted", lambda _, start: self.fit(start))
+        monkeypatch.setattr(set_screening, "by_sensitivities", self.by_sensitivities)
+        monkeypatch.setattr(set_screening, "by_the_reverse_system", lambda *_: {})
+
+    def fit(self, start: SetStart) -> Any:
+        beside = None if start.beside is None else start.beside.name
+        self.fitted.append(("".join(sorted(start.names)), beside))
+        return candidate(start.names, self.leaves(start.names))
+
+    @staticmethod
+    def every(_: frozenset[str], size: int) -> Sequence[Iterable[str]]:
+        return list(combinations(NAMES, size))
+
+    def by_sensitivities(self, parent: Any, _offered: Any, _base: Any, sizes: Sequence[int], _most: int) -> Any:
+        names = frozenset[str]() if parent is None else frozenset(parent.names)
+        self.asked += [(None if parent is None else parent.name, size) for size in sizes]
+        model: Any = None
+        return {n: [SetStart(frozenset(s), model, parent) for s in self.proposed(names, n)] for n in sizes}
+
+    def search(self, *, done: bool = False, fewer_than: int | None = None) -> SetSearch:
+        singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES]
+        base: Any = None
+        return searched(base, singles, lambda _: done, fewer_than)
+
+    def sizes(self) -> set[int]:
+        return {len(names) for names, _ in self.fitted}
+
+
+def hidden(names: str) -> Leaves:
+    """What a set leaves where these effects are missing, all of one size."""
+    return lambda found: dict.fromkeys(set(names) - found, 1.0)
+
+
+def best(search: SetSearch, size: int) -> str:
+    return "".join(search.sets(size)[0].names)
+
+
+def test_a_set_grows_until_one_effect_more_gains_nothing(monkeypatch: pytest.MonkeyPatch):
+    bench = Bench(monkeypatch, hidden("abd"))
+    search = bench.search()
+    assert best(search, 3) == "abd"
+    assert bench.sizes() == {2, 3, 4}  # four are asked for, to see that they gain nothing
+    assert not gains(search.sets(3)[0], search.sets(4)[0], 1)
+
+    smaller = Bench(monkeypatch, hidden("ad"))
+    assert best(smaller.search(), 2) == "ad"
+    assert smaller.sizes() == {2, 3}
+
+
+def test_no_set_is_larger_than_four(monkeypatch: pytest.MonkeyPatch):
+    bench = Bench(monkeypatch, hidden("abcde"))
+    bench.search()
+    assert max(bench.sizes()) == set_search.MOST == 4
+
+
+def test_an_effect_of_the_smaller_set_changes_places_with_another(monkeypatch: pytest.MonkeyPatch):
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        """Effect a does part of what b and c do, and is first alone."""
+        missing = dict.fromkeys({"b", "c"} - found, 1.0)
+        return dict.fromkeys(missing, 0.3) if "a" in found else missing
+
+    bench = Bench(monkeypatch, leaves)
+
+    def near(parent: frozenset[str], size: int) -> list[frozenset[str]]:
+        """Of what has the size, all that adds an effect to the parent or changes one of its."""
+        return [frozenset(s) for s in combinations(NAMES, size) if len(parent & set(s)) >= min(len(parent), size - 1)]
+
+    def proposed(parent: frozenset[str], size: int) -> list[frozenset[str]]:
+        return near(parent, size) if parent else [frozenset("ab")]
+
+    bench.proposed = proposed
+    search = bench.search()
+    assert best(search, 1) == "a"
+    assert best(search, 2) == "bc"
+    assert any(names == "bc" and beside is not None and "a" in beside for names, beside in bench.fitted)
+
+
+def test_where_one_effect_leaves_nothing_only_simple_sets_with_fewer_unknowns_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        return {} if "f" in found else dict.fromkeys({"a", "b"} - found, 1.0)
+
+    bench = Bench(monkeypatch, leaves)
+    search = bench.search(fewer_than=UNKNOWNS["f"])
+    assert best(search, 1) == "f"
+    assert bench.sizes() == {2}
+    beside = {parent for parent, _ in bench.asked if parent is not None}
+    assert beside
+    assert not any("f" in parent for parent in beside)
+    assert frozenset("ab") in search.tried
+
+    none = Bench(monkeypatch, leaves)
+    none.search(fewer_than=2)
+    assert not none.fitted
+
+
+def test_a_flexible_set_that_leaves_nothing_ends_the_search_at_its_own_unknowns(monkeypatch: pytest.MonkeyPatch):
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        if {"e", "f"} <= found:
+            return dict.fromkeys({"d"} - found, 0.3)
+        return dict.fromkeys({"a", "b", "c"} - found, 0.6 if "f" in found else 1.0)
+
+    bench = Bench(monkeypatch, leaves)
+    search = bench.search(done=True)
+    assert best(search, 2) == "ef"  # four unknowns
+    assert frozenset("abc") in search.tried  # simple sets of three have fewer
+    assert bench.sizes() == {2, 3}
+
+    def flexible_at_three() -> bool:
+        return any("f" in parent for parent, size in bench.asked if size == 3 and parent is not None)
+
+    assert gains(search.sets(2)[0], search.sets(3)[0], 1)
+    assert not flexible_at_three()
+    bench.search(done=False)
+    assert flexible_at_three()
+    assert 4 in bench.sizes()
+
+
+@pytest.mark.parametrize("missing", ["a", "ab", "abc", "abcd", "f", "abf"])
+def test_no_set_is_fitted_twice_from_one_beginning(monkeypatch: pytest.MonkeyPatch, missing: str):
+    bench = Bench(monkeypatch, hidden(missing))
+    bench.search()
+    assert bench.fitted
+    assert len(bench.fitted) == len(set(bench.fitted))
+    assert not any(beside is not None and names == beside.replace(" + ", "") for names, beside in bench.fitted)
+
+
+def test_sets_without_one_effect_of_the_best_are_there_to_ask(monkeypatch: pytest.MonkeyPatch):
+    bench = Bench(monkeypatch, hidden("abc"))
+    bench.proposed = lambda _, size: ["abcd"[:size]]
+    search = bench.search()
+    for name in "abc":
+        assert frozenset("abc") - {name} in search.tried
+    count = len(bench.fitted)
+    assert search.without(frozenset("abc"), "b") is search.tried[frozenset("ac")]
+    assert len(bench.fitted) == count
+    assert search.without(frozenset("a"), "a") is None
+
+
+def test_of_a_set_that_is_fitted_again_the_better_fit_stays_and_an_unphysical_one_comes_last():
+    nothing: Any = None
+    search = SetSearch(nothing, {}, {})
+    ends = iter([candidate("ab", {"c": 0.5}), candidate("ab", {}), candidate("ab", {"c": 1.0})])
+    start = SetStart(frozenset("ab"), nothing)
+    object.__setattr__(search, "_fitted", lambda _: next(ends))
+    kept: list[float] = []
+    for _ in range(3):
+        search.fit([start])
+        kept.append(search.tried[frozenset("ab")].power)
+    assert kept[1] < kept[0]
+    assert kept[2] == kept[1]
+    search.tried[frozenset("ac")] = candidate("ac", {"b": 0.2})
+    search.tried[frozenset("bc")] = candidate("bc", {}, unphysical="a mass is positive")
+    assert ["".join(c.names) for c in search.sets(2)] == ["ab", "ac", "bc"]
+
+
+def test_a_gain_is_judged_by_how_many_sets_were_asked_for():
+    smaller, larger = candidate("a", {"b": 0.08}), candidate("ab", {})
+    assert gains(smaller, larger, 1)
+    assert not gains(smaller, larger, 10**9)
+    assert not gains(larger, smaller, 1)

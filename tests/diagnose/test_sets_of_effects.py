@@ -1,0 +1,137 @@
+"""A diagnosis that names a set of effects, and what it says of the others that the record cannot tell from it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from study.diagnose import verdict
+from study.diagnose.adding import added_candidate
+from study.diagnose.confirmed_faults import Diagnosed, diagnose_accounted
+from study.diagnose.diagnosis_report import diagnosis_fields, set_table
+from study.diagnose.diagnosis_sentences import diagnosis_sentences
+from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, Diagnosis
+from study.equations.terms import LIBRARY
+from study.trials.draw import Trial, make_trial
+from study.way_in.compare_records import compare_records
+
+HIDDEN = ("quadratic_stiffness", "coulomb_friction", "cubic_damping")
+OFFERED = (*HIDDEN, "cubic_stiffness", "quadratic_damping", "constant_force")
+NOTHING_YET: Any = None
+
+
+def found(kind: str, *sets: str) -> Diagnosis:
+    """A diagnosis of this verdict with sets of effects of one letter each, the answer first."""
+    rows: Any = tuple(SimpleNamespace(names=tuple(names)) for names in sets)
+    return Diagnosis(kind, NOTHING_YET, (), 9, 0.0, rows, ())
+
+
+def test_how_often_each_effect_is_in_the_sets_is_counted_the_most_frequent_first():
+    assert found(SEVERAL, "ab", "bc", "bd", "cd", "c").included == {"b": 3, "c": 3, "d": 2, "a": 1}
+    assert list(found(SEVERAL, "ab", "cb").included) == ["b", "a", "c"]
+    assert found(NOTHING).included == {}
+
+
+def test_alike_are_effects_that_stand_in_the_place_of_one_of_the_answer():
+    diagnosis = found(SEVERAL, "ab", "cb", "db", "ae", "cd", "abf", "c")
+    assert diagnosis.alike == {"a": ("c", "d"), "b": ("e",)}
+
+
+def test_of_a_single_effect_those_that_do_as_much_are_alike():
+    assert found(MISSING, "a", "b", "c", "bc").alike == {"a": ("b", "c")}
+
+
+@pytest.mark.parametrize("kind", [NOTHING, UNKNOWN])
+def test_without_an_answer_nothing_is_alike(kind: str):
+    diagnosis = found(kind, "ab", "cb")
+    assert diagnosis.answer is None
+    assert diagnosis.alike == {}
+
+
+@pytest.mark.parametrize("kind", [MISSING, SEVERAL, PARTLY_KNOWN])
+def test_the_answer_is_the_first_of_the_sets(kind: str):
+    diagnosis = found(kind, "ab", "cb")
+    assert diagnosis.answer is diagnosis.sets[0]
+
+
+def a_set(names: str, error: float) -> Any:
+    prediction = SimpleNamespace(error=error)
+    return SimpleNamespace(names=tuple(names), entries=tuple(names), prediction=prediction, fit=None)
+
+
+@pytest.mark.parametrize(("left", "kept"), [(0.03, "abc"), (0.05, "ab"), (0.2, "a")])
+def test_an_effect_explains_more_than_what_is_left_or_goes(monkeypatch: pytest.MonkeyPatch, left: float, kept: str):
+    errors = {"abc": 0.06, "ab": 0.0721, "ac": 0.2, "bc": 0.3, "a": 0.15, "b": 0.4, "c": 0.5}  # c explains 4 %, b 13 %
+    sets = {frozenset(names): a_set(names, error) for names, error in errors.items()}
+    search: Any = SimpleNamespace(tried=sets, without=lambda names, name: sets.get(names - {name}))
+    monkeypatch.setattr(verdict, "_left", lambda *_: left)
+    rows: Any = list(sets.values())
+    answer, beside = verdict._material(sets[frozenset("abc")], rows, search, NOTHING_YET)
+    assert "".join(answer.names) == kept
+    assert beside == left
+
+
+@pytest.fixture(scope="module")
+def rig() -> Trial:
+    return make_trial(105, HIDDEN, 0.02**2, "displacement", test="like_the_report")
+
+
+@pytest.fixture(scope="module")
+def of_three(rig: Trial) -> Diagnosed:
+    compared = compare_records([rig.record], rig.believed)
+    return diagnose_accounted(compared, without=[name for name in LIBRARY if name not in OFFERED])
+
+
+@pytest.mark.long
+def test_three_hidden_effects_are_named_together_with_their_coefficients(rig: Trial, of_three: Diagnosed):
+    diagnosis = of_three.diagnosis
+    assert diagnosis.verdict == SEVERAL
+    assert diagnosis.answer is not None
+    assert set(diagnosis.answer.names) == set(HIDDEN)
+    assert diagnosis.left == 0.0
+    assert [row.name for row in diagnosis.candidates[:3]] == list(diagnosis.answer.names)
+    true = rig.truth.numbers()
+    for effect in diagnosis.answer.effects:
+        assert abs(effect.coefficient - true[effect.entry.symbols[0]]) < 3.0 * effect.error
+        assert effect.error < 0.02 * abs(effect.coefficient)
+        assert effect.idle == ""
+
+
+@pytest.mark.long
+def test_what_no_effect_explained_alone_is_no_noise_on_the_force_beside_the_set(of_three: Diagnosed):
+    assert [fault.fault for fault in of_three.accounted.faults] == ["force_noise"]
+    assert of_three.faults == ()
+
+
+@pytest.mark.long
+def test_sentence_table_and_fields_hold_the_set(of_three: Diagnosed):
+    diagnosis = of_three.diagnosis
+    names = diagnosis.answer.names if diagnosis.answer else ()
+    said = diagnosis_sentences(diagnosis)
+    assert said[0].endswith(" are missing.")
+    assert all(words in said[0].lower() for words in ("quadratic stiffness", "coulomb friction", "cubic damping"))
+    assert "falls from 19.6 % to 2.03 %" in said[1]
+    table = set_table(diagnosis)
+    assert ", ".join(names) in table
+    assert "2.03 %" in table
+    fields = diagnosis_fields(diagnosis)
+    assert fields["verdict"] == "missing_effects"
+    assert [effect["term"] for effect in fields["sets"][0]["effects"]] == list(names)
+    assert fields["sets"][0]["distance"] == 0.0
+    assert fields["in_sets"] == dict.fromkeys(names, 1)
+
+
+@pytest.mark.long
+def test_a_set_that_is_added_leaves_what_was_promised(of_three: Diagnosed):
+    diagnosis = of_three.diagnosis
+    assert diagnosis.answer is not None
+    after = added_candidate(diagnosis.comparison, diagnosis.answer)
+    assert after.prediction.error == pytest.approx(diagnosis.answer.response_error, rel=0.03)
+    assert {term.name for term in after.model.terms} >= set(HIDDEN)
+
+
+@pytest.mark.long
+def test_a_table_of_sets_is_for_sets_alone(of_three: Diagnosed):
+    diagnosis = of_three.diagnosis
+    assert set_table(replace(diagnosis, verdict=MISSING, sets=diagnosis.candidates[:1])) == ""
