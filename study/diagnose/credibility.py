@@ -90,7 +90,7 @@ class MotionRange:
         """Between which sizes of such a quantity an effect acts."""
         match quantity:
             case "time":
-                return 0.0, len(u) * self.dt
+                return self.dt, len(u) * self.dt
             case "velocity":
                 return 0.0, float(np.max(np.abs(v)))
             case "1/length":

@@ -152,6 +152,7 @@ def _decide(
     prediction, own = comparison.prediction, held_out_of(comparison)
     trusted = [r for r in rows if believed(r, prediction, own)]
     first = trusted[0] if trusted else None
+    as_ranked = rows
     rows = rows if first is None else [first] + [r for r in rows if r is not first]
     # what is left along another motion tells nothing
     left = _left(comparison.fit, prediction) if first is None else _left(first.fit, first.prediction)
@@ -169,8 +170,7 @@ def _decide(
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (complete and len(answer.entries) == 1):
-        verdict = MISSING if complete else UNKNOWN
-        return _Decision(verdict, rows, left, alone)
+        return _Decision(MISSING, rows, left, alone) if complete else _Decision(UNKNOWN, as_ranked, left, alone)
     answer, left = _material(answer, sets, search, comparison)
     sets = [answer, *(r for r in sets if r is not answer and (r.name in answer.tied_with))]
     names = [r.name for r in rows]
@@ -185,7 +185,7 @@ def _decide(
     steady = not (answer.unphysical or answer.unsteadiness > UNSTEADY or answer.wanders(asked))
     if len(answer.entries) > 1 and steady and explained >= MOST:
         return _Decision(kind if explained >= NEARLY else PARTLY_KNOWN, rows, left, sets)
-    return _Decision(UNKNOWN, rows, left, sets)
+    return _Decision(UNKNOWN, as_ranked, left, sets)
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:

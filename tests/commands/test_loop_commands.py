@@ -189,7 +189,7 @@ def test_a_term_comes_back_where_it_brings_the_best_model_so_far():
     """What was not needed once may be needed when the model around it is another."""
 
     class Row:
-        name = "relaxation"
+        name, names = "relaxation", ("relaxation",)
         response_error = 0.1
 
     class Error:
