@@ -189,7 +189,8 @@ def test_a_term_comes_back_where_it_brings_the_best_model_so_far():
     """What was not needed once may be needed when the model around it is another."""
 
     class Row:
-        name, names = "relaxation", ("relaxation",)
+        name = "relaxation"
+        names = ("relaxation",)
         response_error = 0.1
 
     class Error:
@@ -203,7 +204,7 @@ def test_a_term_comes_back_where_it_brings_the_best_model_so_far():
     assert not climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
     Row.response_error = 0.2
     assert climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
-    Row.name = "hysteresis"
+    Row.names = ("hysteresis",)
     assert not climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
 
 
