@@ -109,13 +109,14 @@ def followed(axes: Axes, rows: Sequence[Ranked], along: str) -> Axes:
     low, high = -0.5, 2.5
     styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))
     for row, (marker, line, colour) in zip(rows, styles, strict=False):
-        curve = row.flatness if along == "frequency" else row.steadiness
+        curve = row.effect.flatness if along == "frequency" else row.effect.steadiness
         if curve is None:
             continue
-        relative = curve.value.real / abs(row.coefficient)  # a curve is one of sizes: along the coefficient's sign
+        # a curve is one of sizes: along the coefficient's sign
+        relative = curve.value.real / abs(row.effect.coefficient)
         low, high = min(low, *relative), max(high, *relative)
         axes.errorbar(
-            curve.at, relative, 1.96 * curve.error / abs(row.coefficient),
+            curve.at, relative, 1.96 * curve.error / abs(row.effect.coefficient),
             marker=marker, linestyle=line, color=colour, capsize=2.0, label=term_names(row.name),
         )  # fmt: skip
     axes.axhline(1.0, color="0.8", linewidth=0.8, zorder=0)

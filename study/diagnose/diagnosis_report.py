@@ -33,7 +33,7 @@ def _shown(number: int, row: Ranked) -> list[str]:
     share = "below -100 %" if row.gain.explained < -1.0 else percent(row.gain.explained, "z.1f", row.gain.error, ".1f")
     return [
         str(number), row.term.name, row.entry.place.label, share, percent(row.response_error),
-        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {row.unit}", f"{row.p_value:.1g}",
+        f"{row.effect.coefficient:.4g} +- {1.96 * row.effect.error:.2g} {row.effect.unit}", f"{row.p_value:.1g}",
         percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", ties,
     ]  # fmt: skip
 
@@ -63,7 +63,7 @@ def set_table(diagnosis: Diagnosis) -> str:
     rows = [
         [
             str(i), ", ".join(row.names), percent(row.gain.explained, "z.1f"), percent(row.response_error),
-            str(row.unknowns), "-" if i == 1 else f"{row.distance:.1f} standard errors",
+            str(row.unknowns), "-" if i == 1 else f"{max(row.distance, 0.0):.1f} standard errors",
         ]
         for i, row in enumerate(diagnosis.sets[:SHOWN], start=1)
     ]  # fmt: skip
@@ -93,13 +93,13 @@ def _candidate(row: Ranked, rows: dict[str, Ranked], named: bool) -> dict[str, A
 
     return {
         "term": row.term.name, **where(row),
-        "parameters": row.parameters, "parameter_errors": row.parameter_errors,
-        "coefficient": row.coefficient, "interval": list(row.interval),
+        "parameters": row.effect.parameters, "parameter_errors": row.effect.parameter_errors,
+        "coefficient": row.effect.coefficient, "interval": list(row.effect.interval),
         "response_error": row.response_error, "noise_floor": row.prediction.floor,
         "explained": row.gain.explained, "explained_error": row.gain.error, "p_value": row.p_value,
         "changes": {
-            "frequency": row.flatness.spread() if row.flatness else None,
-            "amplitude": row.steadiness.spread() if row.steadiness else None,
+            "frequency": row.effect.flatness.spread() if row.effect.flatness else None,
+            "amplitude": row.effect.steadiness.spread() if row.effect.steadiness else None,
         },
         "tied_with": [{"term": rows[n].term.name, **where(rows[n])} if named else n for n in row.tied_with],
         "distance": row.distance if math.isfinite(row.distance) else None,

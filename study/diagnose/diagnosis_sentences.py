@@ -8,7 +8,6 @@ from study.diagnose.constancy import wavers
 from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import FittedEffect, Ranked
 from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
-from study.equations.coefficient_units import coefficient_unit
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
@@ -76,7 +75,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
         f"{words[0].upper()}{words[1:]} is missing{placed} ({first.term.meaning}).",
         f"With it the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, first)}; the "
         f"noise floor is {percent(first.prediction.floor)}.",
-        f"Its coefficient is {_amount(first)}{_shape(first)}.",
+        f"Its coefficient is {_amount(first.effect)}.",
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
@@ -90,16 +89,12 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     effects = enumerated([_with_alike(e.entry, diagnosis) for e in answer.effects])
-    known = (
-        "are missing"
-        if diagnosis.verdict != PARTLY_KNOWN
-        else "are missing, and something beside them that has no name"
-    )
+    nameless = ", and something beside them that has no name" if diagnosis.verdict == PARTLY_KNOWN else ""
     said = [
-        f"{effects[0].upper()}{effects[1:]} {known}.",
+        f"{effects[0].upper()}{effects[1:]} are missing{nameless}.",
         f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "
         f"the noise floor is {percent(answer.prediction.floor)}.",
-        f"Their coefficients are {enumerated([_amount_of(e, answer) for e in answer.effects])}.",
+        f"Their coefficients are {enumerated([_amount(e) for e in answer.effects])}.",
     ]
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside them{_depending(diagnosis)}.")
@@ -128,13 +123,6 @@ def _depending(diagnosis: Diagnosis) -> str:
     return f", which depends on {found[0].family}{place}"
 
 
-def _amount_of(effect: FittedEffect, row: Ranked) -> str:
-    low, high = effect.interval
-    digits = _digits(effect.coefficient, high - low)
-    unit = coefficient_unit(effect.entry, effect.entry.term.symbols[0], row.prediction.prepared.record)
-    return f"{effect.coefficient:.{digits}g} {unit} ({low:.{digits}g} to {high:.{digits}g})"
-
-
 def _unknown(diagnosis: Diagnosis) -> list[str]:
     prediction = diagnosis.comparison.prediction
     error = percent(prediction.error)
@@ -161,18 +149,24 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
 
 
 def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
-    if row.steadiness is not None and wavers(row.steadiness, len(diagnosis.candidates)):
-        change, chance = percent(row.steadiness.spread()), by_chance(row.steadiness.p_value())
+    if row.effect.steadiness is not None and wavers(row.effect.steadiness, len(diagnosis.candidates)):
+        change, chance = percent(row.effect.steadiness.spread()), by_chance(row.effect.steadiness.p_value())
         return f"its coefficient changes with the amplitude by {change} ({chance})"
-    if row.flatness is not None and row.flatness.spread() > UNSTEADY:
-        return f"its coefficient changes with the frequency by {percent(row.flatness.spread())}"
+    if row.effect.flatness is not None and row.effect.flatness.spread() > UNSTEADY:
+        return f"its coefficient changes with the frequency by {percent(row.effect.flatness.spread())}"
     return f"what remains still depends on the motion, its past or time ({percent(diagnosis.left)} of the response)"
 
 
-def _amount(row: Ranked) -> str:
-    low, high = row.interval
-    digits = _digits(row.coefficient, high - low)
-    return f"{row.coefficient:.{digits}g} {row.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+def _amount(effect: FittedEffect) -> str:
+    """Coefficient and shape parameters with their errors."""
+    low, high = effect.interval
+    digits = _digits(effect.coefficient, high - low)
+    said = f"{effect.coefficient:.{digits}g} {effect.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+    parts = [
+        f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
+        for name, value in effect.parameters.items()
+    ]
+    return f"{said}, with {', '.join(parts)}" if parts else said
 
 
 def _digits(value: float, width: float) -> int:
@@ -180,15 +174,6 @@ def _digits(value: float, width: float) -> int:
     if value == 0.0 or not 0.0 < width < math.inf:
         return 4
     return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
-
-
-def _shape(row: Ranked) -> str:
-    units = row.parameter_units
-    parts = [
-        f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g} {units[name]}"
-        for name, value in row.parameters.items()
-    ]
-    return f", with {', '.join(parts)}" if parts else ""
 
 
 def _few(entries: Sequence[ModelTerm]) -> str:

@@ -34,6 +34,8 @@ class FittedEffect:
     flatness: CoefficientCurve | None  # the coefficient along frequency
     steadiness: CoefficientCurve | None  # the coefficient along amplitude
     idle: str  # why it does not act as itself along this motion, as a clause; empty where it does
+    unit: str  # of the coefficient
+    parameter_units: dict[str, str]  # of the parameters
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -66,52 +68,6 @@ class Ranked(FittedCandidate):
     def effect(self) -> FittedEffect:
         """The effect; of a set, the one that is known least."""
         return min(self.effects, key=lambda effect: effect.clear)
-
-    @property
-    def coefficient(self) -> float:
-        """Coefficient of the effect."""
-        return self.effect.coefficient
-
-    @property
-    def error(self) -> float:
-        """Its standard error."""
-        return self.effect.error
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Its 95 % confidence interval."""
-        return self.effect.interval
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Shape parameters of the effect, and its phase if it has any."""
-        return self.effect.parameters
-
-    @property
-    def parameter_errors(self) -> dict[str, float]:
-        """Their standard errors."""
-        return self.effect.parameter_errors
-
-    @property
-    def flatness(self) -> CoefficientCurve | None:
-        """The effect's coefficient along frequency."""
-        return self.effect.flatness
-
-    @property
-    def steadiness(self) -> CoefficientCurve | None:
-        """The effect's coefficient along amplitude."""
-        return self.effect.steadiness
-
-    @property
-    def unit(self) -> str:
-        """Unit of the coefficient."""
-        entry = self.effect.entry
-        return coefficient_unit(entry, entry.term.symbols[0], self.prediction.prepared.record)
-
-    @property
-    def parameter_units(self) -> dict[str, str]:
-        """Units of the parameters, by their names."""
-        return parameter_units(self.effect.entry, self.prediction.prepared.record) | {"phase": "rad"}
 
     @property
     def unphysical(self) -> str:
@@ -172,7 +128,9 @@ def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
         coefficient, error, parameters, errors = amount(entry, fit.keys, fit.values, covariance)
         along = curves(fit, entry, prepared.dt, jacobian)
         idle = reach.idle(entry.term, np.array(entry.place.direction(fit.model.coordinates)), parameters, errors)
-        return FittedEffect(entry, coefficient, error, parameters, errors, *along, idle)
+        units = parameter_units(entry, prepared.record) | {"phase": "rad"}
+        unit = coefficient_unit(entry, entry.term.symbols[0], prepared.record)
+        return FittedEffect(entry, coefficient, error, parameters, errors, *along, idle, unit, units)
 
     effects = tuple(effect(entry) for entry in candidate.entries)
     return Ranked(

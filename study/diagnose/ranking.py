@@ -100,7 +100,7 @@ def _tied(row: Ranked, rows: Sequence[Ranked], white: Mapping[str, Floats]) -> I
 
 def _believable(row: Ranked) -> bool:
     """Whether a candidate explains anything at all with a coefficient that is not zero: others tie with nothing."""
-    low, high = row.interval
+    low, high = row.effect.interval
     return row.gain.explained > 0.0 and row.p_value < ALPHA and not low <= 0.0 <= high
 
 

@@ -78,16 +78,16 @@ def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
         return separating_sensor(rows[0], rival)
     level = separating_level(rows[0], rival, prepared)
     one, other = (
-        [term_names(e.term.name) for e in row.entries if e.name not in without.names]
+        enumerated([term_names(e.term.name) for e in row.entries if e.name not in without.names])
         for row, without in ((rows[0], rival), (rival, rows[0]))
     )
-    names = f"{enumerated(one) or 'the smaller set'} and {enumerated(other) or 'the smaller set'}"
+    asked = f"tell {one} and {other} apart" if one and other else f"tell whether {one or other} acts as well"
     if level is None:
         whole = prepared.response == "displacement"
-        other = "another kind of test" if whole else "the displacement, its mean included,"
-        return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
+        needed = "another kind of test" if whole else "the displacement, its mean included,"
+        return f"No level from a quarter to five times this one would {asked}; {needed} is needed."
     how = "move it by" if prepared.response == FORCE else "let it go at" if prepared.free else "excite at"
-    return f"To tell {names} apart, {how} {level:g} times this level."
+    return f"To {asked}, {how} {level:g} times this level."
 
 
 def separating_sensor(first: Ranked, tied: Ranked) -> str:

@@ -125,10 +125,7 @@ def search_part(prepared: Prepared) -> Prepared:
 
 def search_base(comparison: Comparison) -> Baseline:
     """The fitted model as candidates are tried beside it: on no more samples, in no more steps, than a search takes."""
-    return _search_base(comparison.fit, search_part(comparison.prepared))
-
-
-def _search_base(fit: FreeRunFit, look: Prepared) -> Baseline:
+    fit, look = comparison.fit, search_part(comparison.prepared)
     try:
         again = fit_part(fit.model, look, fit.held, steps=rough_steps(fit.model, look, {}))
     except DivergenceError:  # stiff: nothing runs with fewer steps
@@ -182,9 +179,11 @@ def _decide(
         return _Decision(kind, rows, left, sets)
     if len(answer.entries) == 1 and _stands_out(answer, comparison.prepared):
         return _Decision(kind, rows, left, sets)
-    steady = not (answer.unphysical or answer.unsteadiness > UNSTEADY or answer.wanders(asked))
-    if len(answer.entries) > 1 and steady and explained >= MOST:
-        return _Decision(kind if explained >= NEARLY else PARTLY_KNOWN, rows, left, sets)
+    if len(answer.entries) > 1 and not (answer.unphysical or answer.unsteadiness > UNSTEADY):
+        if explained >= NEARLY:
+            return _Decision(kind, rows, left, sets)
+        if explained >= MOST and not answer.wanders(asked):
+            return _Decision(PARTLY_KNOWN, rows, left, sets)
     return _Decision(UNKNOWN, as_ranked, left, sets)
 
 
@@ -229,9 +228,9 @@ def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
         return False
     without, with_it = evidence(prediction, own), evidence(row.prediction, row.held_out)
     if not alike(without, with_it):
-        return credible(prediction, row.prediction, row.interval, row.p_value)
+        return credible(prediction, row.prediction, row.effect.interval, row.p_value)
     falls = row.response_error < prediction.error
-    return falls and credible(without, with_it, row.interval, row.p_value)
+    return falls and credible(without, with_it, row.effect.interval, row.p_value)
 
 
 def _stands_out(first: Ranked, prepared: Prepared) -> bool:

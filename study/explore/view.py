@@ -225,9 +225,9 @@ def _constancy(rows: Sequence[Ranked]) -> Columns:
     """A_j(f) of every candidate whose coefficient was followed, one below the other; ``row`` tells whose it is."""
     columns: dict[str, list[Floats]] = {name: [np.zeros(0)] for name in ("row", "f", "value", "low", "high")}
     for i, row in enumerate(rows):
-        if (line := row.flatness) is None:
+        if (line := row.effect.flatness) is None:
             continue
-        unit = power_of_ten(abs(row.coefficient))[0]  # of its axis
+        unit = power_of_ten(abs(row.effect.coefficient))[0]  # of its axis
         bounds = {"low": -NINETY_FIVE, "value": 0.0, "high": NINETY_FIVE}
         values = {name: (line.value.real + errors * line.error) / unit for name, errors in bounds.items()}
         for name, column in {"row": np.full(len(line.at), float(i)), "f": line.at, **values}.items():

@@ -200,7 +200,7 @@ def _label(row: Ranked) -> str:
     """Label of the axis on which the candidate's coefficient is drawn; of a set, that which is known least."""
     symbols = ", ".join(row.effect.entry.term.symbols)
     symbol = f"|{symbols}|" if "," in symbols else symbols
-    return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + row.unit)}"
+    return f"{symbol} / {in_text(power_of_ten(abs(row.effect.coefficient))[1] + row.effect.unit)}"
 
 
 def _rank(row: Ranked, rows: Sequence[Ranked]) -> str:

@@ -56,17 +56,28 @@ class Accounted:
 
     def faults_beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
         """The faults that the record shows beside a fuller model, which begins at a fit of it."""
-        found = accounted(
-            model, self.given, held=self.known, switched_off=self.switched_off, as_sampled=self.as_sampled, near=fit
-        )
-        return found.faults
+        return _corrected(model, self.given, self.known, self.switched_off, self.as_sampled, near=fit).faults
 
     def corrected_for(self, faults: Sequence[Fault]) -> "Accounted":
         """The comparison of the same model with the record corrected for other faults."""
-        needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if self.as_sampled else without_spare_samples
-        prepared = needed(corrected(self.given, faults))
+        prepared = _needed(self.as_sampled)(corrected(self.given, faults))
         prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
         return replace(self, comparison=compare(self.comparison.model, prepared), faults=tuple(faults))
+
+
+@dataclass(frozen=True, eq=False)
+class _Corrected:
+    """A record corrected for the faults that a search has found."""
+
+    prepared: Prepared  # without the samples that its motion does not ask for
+    faults: tuple[Fault, ...]
+    fit: FreeRunFit | None  # of the model to it, where there is one
+    given: Prepared  # the record before that, with what is said of it
+
+
+def _needed(as_sampled: bool) -> Callable[[Prepared], Prepared]:
+    """What leaves of a record the samples that are used: all of them, or those that its motion asks for."""
+    return (lambda whole: whole) if as_sampled else without_spare_samples
 
 
 def accounted(
@@ -78,7 +89,6 @@ def accounted(
     estimator: str = FREE_RUN,
     progress: Callable[[str], None] | None = None,
     as_sampled: bool = False,
-    near: FreeRunFit | None = None,
 ) -> Accounted:
     """Compare a model with a record, the faults of the measurement accounted for.
 
@@ -95,8 +105,6 @@ def accounted(
         Faults that are not looked for.
     as_sampled : bool
         Whether all samples are used, whether the motion asks for them or not.
-    near : FreeRunFit, optional
-        A fit of the model where the search begins; from nothing if left out.
 
     Returns
     -------
@@ -108,13 +116,21 @@ def accounted(
     StudyError
         If the model cannot be fitted.
     """
-    given, begin = held_in(prepared, held or {}), None
+    known = held or {}
+    found = _corrected(model, prepared, known, switched_off, as_sampled)
+    comparison = _compared(model, found.prepared, found.faults, found.fit, estimator, progress)
+    return Accounted(comparison, found.faults, found.given, known, tuple(switched_off), as_sampled)
+
+
+def _corrected(
+    model: Model, prepared: Prepared, known: Held, switched_off: Sequence[str], as_sampled: bool,
+    near: FreeRunFit | None = None,
+) -> _Corrected:  # fmt: skip
+    """The record corrected for what is known and found of its faults; ``near`` is a fit where the search begins."""
+    given, begin = held_in(prepared, known), None
     if near is not None:
         values = near.model.numbers()
         begin = {key: values[key] for key, value in model.values.items() if value is None}
-
-    def result(comparison: Comparison, faults: tuple[Fault, ...]) -> Accounted:
-        return Accounted(comparison, faults, prepared, held or {}, tuple(switched_off), as_sampled)
 
     asked = asked_of(prepared, [name for name in FAULTS if name not in switched_off], given)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
@@ -123,12 +139,12 @@ def accounted(
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, said))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
-    needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if as_sampled else without_spare_samples
+    needed = _needed(as_sampled)
     faults = first_faults(prepared, given, asked) if given or asked else ()
     first = corrected(prepared, faults)
     fewer = needed(first)
     if not asked:
-        return result(_compared(model, fewer, faults, None, estimator, progress), faults)
+        return _Corrected(fewer, faults, None, prepared)
     late: Refined | None = None
     try:
         fit = fit_model(model, fewer, begin)
@@ -137,8 +153,8 @@ def accounted(
         if late is None:
             raise
         fit = late.left.fit
-        known = (*faults, late.fault)
-        end = search_faults(prepared, _on_all(fit, corrected(prepared, known)), known, asked)
+        begun = (*faults, late.fault)
+        end = search_faults(prepared, _on_all(fit, corrected(prepared, begun)), begun, asked)
     else:
         lost = has_lost_the_motion(fit, fewer)
         told = tuple(one for one in asked if not (lost and one[0] in OF_THE_MOTION))
@@ -149,11 +165,11 @@ def accounted(
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
-        return result(_compared(model, fewer, end.faults, fit, estimator, progress), end.faults)
+        return _Corrected(fewer, end.faults, fit, prepared)
     final = corrected(prepared, end.faults)
     kept = needed(final)
     best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
-    return result(_compared(model, kept, end.faults, best, estimator, progress), end.faults)
+    return _Corrected(kept, end.faults, best, prepared)
 
 
 def _beneath_too(

@@ -119,4 +119,6 @@ def estimated(parameters: pd.DataFrame) -> str:
 def term_names(text: str) -> str:
     """Names of terms in words: ``van_der_pol_damping`` becomes ``Van der Pol damping``."""
     words = text.replace("_", " ")
-    return words.replace("van der pol", "Van der Pol").replace("coulomb", "Coulomb")
+    for name in ("Van der Pol", "Coulomb", "Stribeck"):
+        words = words.replace(name.lower(), name)
+    return words

@@ -60,18 +60,20 @@ class Fit(FitPictures):
     ----------
     comparison : study.compare.comparison.Comparison
         Everything that was found, as the packages below hold it.
-    faults : tuple of Fault
-        Faults of the measurement that the record is corrected for.
+    asked : Accounted
+        The record before it was corrected, what was asked of it, and what it is corrected for.
     separate : tuple of Separate
         Coefficients that may differ between the records.
-    asked : Accounted, optional
-        The record before it was corrected, and what was asked of it; None of a fit that begins with one corrected.
     """
 
     comparison: Comparison
-    faults: tuple[Fault, ...] = ()
+    asked: Accounted
     separate: tuple[Separate, ...] = ()
-    asked: Accounted | None = None
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Faults of the measurement that the record is corrected for, or may have."""
+        return self.asked.faults
 
     @property
     def model(self) -> Model:
@@ -358,7 +360,7 @@ def fitted(
     found = compare_records(asked, equation, layout, settings, absolute=absolute, estimator=estimator)
     prepared = found.comparison.prepared
     of_all = replace(prepared.record, name=", ".join(one.name for one in asked))
-    return Fit(replace(found.comparison, prepared=replace(prepared, record=of_all)), found.faults, separate, found)
+    return Fit(replace(found.comparison, prepared=replace(prepared, record=of_all)), found, separate)
 
 
 def records_of(given: object) -> list[Record]:

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 from study.diagnose import confirmed_faults, diagnosis_report
 from study.diagnose import verdict as verdicts
-from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.diagnosis_files import diagnosis_in_words
-from study.diagnose.force_between import diagnose_as_read
-from study.diagnose.ranked import Ranked
+from study.diagnose.ranked import FittedEffect, Ranked
 from study.diagnose.user_candidates import check_on
 from study.equations import terms
 from study.faults.fault import Fault
@@ -27,18 +25,15 @@ MISSING, NOTHING, UNKNOWN = verdicts.MISSING, verdicts.NOTHING, verdicts.UNKNOWN
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate:
-    """An effect that may be missing, as it was fitted.
+    """An effect that may be missing, or a set of effects, as it was fitted.
 
     Attributes
     ----------
     ranked : study.diagnose.ranked.Ranked
         Everything that was found, as the packages below hold it.
-    unit : str
-        Of the coefficient.
     """
 
     ranked: Ranked
-    unit: str
 
     @property
     def name(self) -> str:
@@ -46,14 +41,34 @@ class Candidate:
         return self.ranked.name
 
     @property
+    def effects(self) -> "tuple[Candidate, ...]":
+        """Each effect of a set as it was fitted beside the others, with the error of all together; itself of one."""
+        ranked = self.ranked
+        return tuple(Candidate(replace(ranked, entries=(e.entry,), effects=(e,))) for e in ranked.effects)
+
+    @property
+    def _alone(self) -> FittedEffect:
+        expect(
+            len(self.ranked.effects) == 1,
+            f"{self.name!r} is a set of {len(self.ranked.effects)} effects, each with a coefficient of its own; "
+            "expected one of its effects",
+        )
+        return self.ranked.effect
+
+    @property
     def coefficient(self) -> float:
-        """Its coefficient; the amplitude, for an effect of any phase."""
-        return self.ranked.coefficient
+        """Coefficient of one effect; the amplitude, for an effect of any phase. Refused of a set (``effects``)."""
+        return self._alone.coefficient
 
     @property
     def interval(self) -> tuple[float, float]:
         """95 % confidence interval of the coefficient."""
-        return self.ranked.interval
+        return self._alone.interval
+
+    @property
+    def unit(self) -> str:
+        """Unit of the coefficient."""
+        return self._alone.unit
 
     @property
     def explained(self) -> float:
@@ -77,11 +92,8 @@ class Candidate:
 
     def __repr__(self) -> str:
         """One line: name, what it explains, coefficient."""
-        half = 1.96 * self.ranked.error
-        return (
-            f"<Candidate {self.name}: explains {percent(self.explained, '.3g')}, "
-            f"{self.coefficient:.4g} +- {half:.2g} {self.unit}>"
-        )
+        amounts = ", ".join(f"{e.coefficient:.4g} +- {1.96 * e.error:.2g} {e.unit}" for e in self.ranked.effects)
+        return f"<Candidate {self.name}: explains {percent(self.explained, '.3g')}, {amounts}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,18 +122,18 @@ class Diagnosis:
     @property
     def candidates(self) -> tuple[Candidate, ...]:
         """All that were tried, best first."""
-        return tuple(Candidate(r, r.unit) for r in self.result.candidates)
+        return tuple(Candidate(r) for r in self.result.candidates)
 
     @property
     def best(self) -> Candidate | None:
         """What is missing, an effect or a set of effects; None unless the verdict names one."""
         answer = self.result.answer
-        return None if answer is None else Candidate(answer, answer.unit)
+        return None if answer is None else Candidate(answer)
 
     @property
     def sets(self) -> tuple[Candidate, ...]:
         """The answer, and all other effects and sets of effects that the record cannot tell from the best."""
-        return tuple(Candidate(r, r.unit) for r in self.result.sets)
+        return tuple(Candidate(r) for r in self.result.sets)
 
     def __getitem__(self, name: str) -> Candidate:
         """The candidate of this name; a ``StudyError`` if there is none."""
@@ -175,7 +187,7 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         rows = [
             [str(place), c.name, f"{percent(c.explained, 'z.1f')}", percent(c.error),
-             f"{c.coefficient:.4g} ± {1.96 * c.ranked.error:.2g} {c.unit}", f"{c.p_value:.1g}"]
+             f"{c.coefficient:.4g} ± {1.96 * c.ranked.effect.error:.2g} {c.unit}", f"{c.p_value:.1g}"]
             for place, c in enumerate(self.candidates[: diagnosis_report.SHOWN], start=1)
         ]  # fmt: skip
         heads = ["", "effect", "explains", "error with it", "coefficient", "p"]
@@ -188,9 +200,6 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
         terms.get(name)
     extra = [terms.custom(name, formula) for name, formula in own.items()]
     check_on(fit.comparison.record, extra)
-    if fit.asked is None:
-        result = diagnose_as_read(fit.comparison, extra=extra, without=tuple(without))
-        return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))
-    asked = replace(fit.asked, comparison=fit.comparison, faults=fit.faults)
+    asked = replace(fit.asked, comparison=fit.comparison)
     found = confirmed_faults.diagnose_accounted(asked, extra=extra, without=tuple(without))
     return Diagnosis(found.diagnosis, found.faults, Words(diagnosis_in_words(found.diagnosis)))

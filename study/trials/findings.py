@@ -39,7 +39,7 @@ def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
     """The effects that the record cannot tell apart, the one put first among them; empty where none is named."""
     if diagnosis.verdict != MISSING:
         return ()
-    return tuple(row.name for row in diagnosis.sets)
+    return tuple(row.name for row in diagnosis.sets if len(row.entries) == 1)
 
 
 def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
@@ -54,7 +54,7 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     true = next((row for row in rows if row.name in hidden), None)
     before = diagnosis.comparison.prediction
     # Those that would be believed whatever their p value: one of zero is below any alpha.
-    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, 0.0)]
+    believable = [r.p_value for r in rows if credible(before, r.prediction, r.effect.interval, 0.0)]
     return {
         "smallest_p": min(believable, default=1.0),
         "true_p": math.nan if true is None else true.p_value,

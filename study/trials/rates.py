@@ -127,8 +127,9 @@ def nothing_score(row: Row) -> float:
 
 
 def pair_score(row: Row) -> float:
-    """One if the two that were put first, one after the other, are the two hidden effects."""
+    """One if the two that are named at once, or were put first one after the other, are the two hidden effects."""
     put_first = [row[column].split("+")[0] for column in ("tie_set", "second_tie_set")]
+    put_first = put_first if row["tie_set"] else row["pair"].split("+")
     return float(set(put_first) == set(row["hidden"].split("+")))
 
 

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from study.diagnose.adding import added
+from study.diagnose.adding import added, added_candidate
 from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.verdict import NOTHING, diagnose
 from study.equations.terms import LIBRARY
@@ -155,13 +155,15 @@ def _judged_driven(order: Order, trial: Trial) -> Row:
     found = diagnose_accounted(begun, without=order.hidden or () if order.kind == REMOVED else ())
     diagnosis, before = found.diagnosis, found.diagnosis.comparison
     named = tie_set(diagnosis)
-    together = diagnosis.answer.names if diagnosis.answer is not None and not named else ()
+    together = diagnosis.answer if diagnosis.answer is not None and not named else None
     after = added(before, diagnosis.candidates[0].term) if named else before
+    after = after if together is None else added_candidate(before, together)
     seen = [fault_fields(fault) for fault in found.faults]
     row: Row = {
         "fault_shown": findings.fault_shown(trial, [str(field["fault"]) for field in seen]),
         "verdict": diagnosis.verdict, "first": next((c.name for c in diagnosis.candidates), ""),
-        "tie_set": "+".join(named), "tie_size": len(named), "pair": "+".join(together), "left": diagnosis.left,
+        "tie_set": "+".join(named), "tie_size": len(named), "pair": "+".join(together.names if together else ()),
+        "left": diagnosis.left,
         "error_before": before.prediction.error, "error_after": after.prediction.error,
         "error_true": findings.error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
         "noise_floor": before.prediction.floor,

@@ -70,9 +70,9 @@ def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
     diagnosis = diagnose(compare(LINEAR, prepare_record(record)), without=OTHERS)
     first = diagnosis.candidates[0]
     assert first.name == "hysteresis"
-    assert first.coefficient == pytest.approx(5e4, rel=0.02)
-    assert first.parameters["beta"] == pytest.approx(800.0, rel=0.05)
-    assert first.parameters["gamma"] == pytest.approx(-1100.0, rel=0.05)
+    assert first.effect.coefficient == pytest.approx(5e4, rel=0.02)
+    assert first.effect.parameters["beta"] == pytest.approx(800.0, rel=0.05)
+    assert first.effect.parameters["gamma"] == pytest.approx(-1100.0, rel=0.05)
 
 
 def test_data_come_from_the_folder_that_the_variable_names(monkeypatch):

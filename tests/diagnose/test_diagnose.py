@@ -54,8 +54,8 @@ def test_the_hidden_effect_is_named_with_its_coefficient(drag, of_drag):
     assert first.p_value < 1e-4
     true = drag.truth.values["c2"]
     assert true is not None
-    assert abs(first.coefficient - true) < 4.0 * first.error
-    assert first.error < 0.2 * abs(true)
+    assert abs(first.effect.coefficient - true) < 4.0 * first.effect.error
+    assert first.effect.error < 0.2 * abs(true)
     assert first.response_error < before.error
     assert first.response_error == pytest.approx(before.floor, rel=0.1)
 
@@ -123,11 +123,11 @@ def test_the_fields_are_those_of_the_file(of_drag):
 
 def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
     first = of_drag.candidates[0]
-    first = replace(first, effects=(replace(first.effect, error=1e-7 * abs(first.coefficient)),))
+    first = replace(first, effects=(replace(first.effect, error=1e-7 * abs(first.effect.coefficient)),))
     said = " ".join(diagnosis_sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:]))))
     low, high = re.search(r"95 % interval (\S+) to (\S+?)\)", said).groups()
-    assert float(low) < first.coefficient < float(high)
-    assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.coefficient), rel=0.2)
+    assert float(low) < first.effect.coefficient < float(high)
+    assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.effect.coefficient), rel=0.2)
 
 
 @pytest.mark.parametrize("error", [np.inf, np.nan, 0.0])

@@ -58,7 +58,7 @@ def result(model: Model, record: Record, halves: bool = False) -> dict[str, Any]
     first = diagnosis.candidates[0]
     return {
         "verdict": diagnosis.verdict, "first": first.name, "tied": sorted(first.tied_with),
-        "coefficient": first.coefficient, "symbol": first.term.symbols[0],
+        "coefficient": first.effect.coefficient, "symbol": first.term.symbols[0],
         "error": diagnosis.comparison.prediction.error, "error_with": first.response_error,
     }  # fmt: skip
 

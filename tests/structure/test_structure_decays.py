@@ -107,8 +107,8 @@ def test_a_hardening_spring_is_found_where_it_is():
     assert diagnosis.verdict == MISSING
     first = diagnosis.candidates[0]
     assert first.name == "cubic_stiffness[ground-a]"
-    assert first.coefficient == pytest.approx(60000.0, abs=4.0 * first.error)
-    assert first.error < 0.05 * 60000.0
+    assert first.effect.coefficient == pytest.approx(60000.0, abs=4.0 * first.effect.error)
+    assert first.effect.error < 0.05 * 60000.0
     assert first.response_error < 1.2 * first.prediction.floor
 
 
