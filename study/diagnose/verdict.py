@@ -147,44 +147,57 @@ def _decide(
 ) -> _Decision:  # fmt: skip
     """One effect that explains everything; else the set that does, as far as the record bears it."""
     prediction, own = comparison.prediction, held_out_of(comparison)
-    trusted = [r for r in rows if believed(r, prediction, own)]
-    first = trusted[0] if trusted else None
-    as_ranked = rows
-    rows = rows if first is None else [first] + [r for r in rows if r is not first]
-    # what is left along another motion tells nothing
-    left = _left(comparison.fit, prediction) if first is None else _left(first.fit, first.prediction)
-    lost = has_lost_the_motion(comparison.fit, comparison.prepared)
-    if first is None and left <= TOLERANCE and not lost:
-        return _Decision(NOTHING, rows, left, [])
-    complete = first is not None and (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
-    alone = [] if first is None else [first, *(r for r in rows if r.name in first.tied_with)]
+    first = next((r for r in rows if believed(r, prediction, own)), None)
+    one, fewer_than = _of_one(first, rows, comparison, asked), None
+    if one.verdict == NOTHING:
+        return one
     # shapes of the motion see little of what is left in a drifting one: then a second effect is asked for all the same
-    plain = first is not None and (first.gain.explained >= ENOUGH or first.response_error <= GOOD)
-    if first is not None and complete and plain and first.unknowns <= 2:
-        return _Decision(MISSING, rows, left, alone)
-    fewer_than = first.unknowns if first is not None and complete and plain else None
+    if first is not None and one.verdict == MISSING and _nearly_all(first):
+        if first.unknowns <= 2:
+            return one
+        fewer_than = first.unknowns
     search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
-    if answer is None or (complete and len(answer.entries) == 1):
-        return _Decision(MISSING, rows, left, alone) if complete else _Decision(UNKNOWN, as_ranked, left, alone)
+    if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
+        return one
     answer, left = _material(answer, sets, search, comparison)
-    sets = [answer, *(r for r in sets if r is not answer and (r.name in answer.tied_with))]
-    names = [r.name for r in rows]
-    order = {name: i for i, name in enumerate(answer.names)}
-    rows = sorted(rows, key=lambda r: (order.get(r.name, len(order)), names.index(r.name)))
-    kind = MISSING if len(answer.entries) == 1 else SEVERAL
-    explained = answer.gain.explained
+    verdict = _verdict_on(answer, left, comparison.prepared, asked)
+    if verdict != UNKNOWN:
+        rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
+    return _Decision(verdict, rows, left, [answer, *(r for r in sets if r.name in answer.tied_with)])
+
+
+def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, asked: int) -> _Decision:
+    """What single effects bear: ``first`` is the first that is believed, if any is."""
+    if first is None:
+        left = _left(comparison.fit, comparison.prediction)
+        # what is left along another motion tells nothing
+        lost = has_lost_the_motion(comparison.fit, comparison.prepared)
+        return _Decision(UNKNOWN if left > TOLERANCE or lost else NOTHING, rows, left, [])
+    left = _left(first.fit, first.prediction)
+    alone = [first, *(r for r in rows if r.name in first.tied_with)]
+    if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked):
+        return _Decision(MISSING, [first] + [r for r in rows if r is not first], left, alone)
+    return _Decision(UNKNOWN, rows, left, alone)
+
+
+def _nearly_all(row: Ranked) -> bool:
+    return row.gain.explained >= ENOUGH or row.response_error <= GOOD
+
+
+def _verdict_on(answer: Ranked, left: float, prepared: Prepared, asked: int) -> str:
+    """What the best set bears beside which so much is left."""
+    explained, one = answer.gain.explained, len(answer.entries) == 1
     if (explained >= ENOUGH or left <= GOOD) and not answer.wanders(asked):
-        return _Decision(kind, rows, left, sets)
-    if len(answer.entries) == 1 and _stands_out(answer, comparison.prepared):
-        return _Decision(kind, rows, left, sets)
-    if len(answer.entries) > 1 and not (answer.unphysical or answer.unsteadiness > UNSTEADY):
-        if explained >= NEARLY:
-            return _Decision(kind, rows, left, sets)
-        if explained >= MOST and not answer.wanders(asked):
-            return _Decision(PARTLY_KNOWN, rows, left, sets)
-    return _Decision(UNKNOWN, as_ranked, left, sets)
+        return MISSING if one else SEVERAL
+    if one:
+        return MISSING if _stands_out(answer, prepared) else UNKNOWN
+    if answer.unphysical or answer.unsteadiness > UNSTEADY:
+        return UNKNOWN
+    if explained >= NEARLY:
+        return SEVERAL
+    return PARTLY_KNOWN if explained >= MOST and not answer.wanders(asked) else UNKNOWN
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
