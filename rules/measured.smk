@@ -12,7 +12,7 @@ with one_sentence():
     )
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
-CODE["measured"] += [f"study/explore/{name}.{ending}" for name in ("page", "placed") for ending in ("html", "css", "js")]
+CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
 CODE["gallery"] = rests_on(Path("scripts/gallery.py"))
 OF_STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
 ENTRIES = dict.fromkeys(row.entry for row in MEASUREMENTS.values())

@@ -40,9 +40,10 @@ def residual_checks(prediction: Prediction, sensor: int = 0) -> ResidualChecks:
     """The checks of the residual of one of the sensors on the judging part."""
     prepared, residual = prediction.prepared, prediction.of(sensor).residual
     residual = residual - np.mean(residual)
-    force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
-    force = force - np.mean(force)
-    n = len(residual)
+    n, force = len(residual), np.zeros(len(residual))
+    if not prepared.free:
+        force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
+        force = force - np.mean(force)
     lags = min(LAGS, n // 4)
     own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)
     both = cross_correlation(residual, force, lags)

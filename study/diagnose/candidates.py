@@ -6,6 +6,7 @@ at which of them which effects are worth a fit (``shape_search``).
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_range import idle_effects
 from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
@@ -71,11 +73,12 @@ class FittedCandidate:
         """Mean square of what it leaves on both parts."""
         return float(np.mean(np.concatenate([self.fit.residual, self.prediction.residual]) ** 2))
 
-    @property
+    @cached_property
     def unphysical(self) -> str:
-        """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
+        """Why it is no physical effect as fitted, or does not act as itself; empty if neither is so."""
         values = self.fit.model.values
-        return next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
+        broken = next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
+        return broken or idle_effects(self.fit, self.entries, self.prediction.prepared)
 
 
 def _own(entry: ModelTerm, values: Mapping[str, float | None]) -> dict[str, float | None]:

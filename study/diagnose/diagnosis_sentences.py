@@ -89,15 +89,17 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     effects = enumerated([_with_alike(e.entry, diagnosis) for e in answer.effects])
-    nameless = ", and something beside them that has no name" if diagnosis.verdict == PARTLY_KNOWN else ""
+    one = len(answer.effects) == 1
+    are, them, their = ("is", "it", "Its coefficient is") if one else ("are", "them", "Their coefficients are")
+    nameless = f", and something beside {them} that has no name" if diagnosis.verdict == PARTLY_KNOWN else ""
     said = [
-        f"{effects[0].upper()}{effects[1:]} are missing{nameless}.",
-        f"With them the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "
+        f"{effects[0].upper()}{effects[1:]} {are} missing{nameless}.",
+        f"With {them} the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "
         f"the noise floor is {percent(answer.prediction.floor)}.",
-        f"Their coefficients are {enumerated([_amount(e) for e in answer.effects])}.",
+        f"{their} {enumerated([_amount(e) for e in answer.effects])}.",
     ]
     if diagnosis.left > 0.0:
-        said.append(f"{percent(diagnosis.left)} of the response is left beside them{_depending(diagnosis)}.")
+        said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
         said.append(f"As fitted one of them is no physical effect: {answer.unphysical}.")
     if len(diagnosis.sets) > 1:

@@ -3,16 +3,17 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from study.compare.prediction import Prediction
 from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
-from study.diagnose.credibility import motion_range
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.model import ModelTerm
+from study.identify.time_domain.motion_range import motion_range
 from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.support import statistics
 from study.support.arrays import Floats
@@ -69,10 +70,10 @@ class Ranked(FittedCandidate):
         """The effect; of a set, the one that is known least."""
         return min(self.effects, key=lambda effect: effect.clear)
 
-    @property
+    @cached_property
     def unphysical(self) -> str:
-        """Why it is no physical effect as fitted, or does not act as itself; empty if neither is so."""
-        return super().unphysical or self.idle
+        """The same; of what the record does not tell from nothing too."""
+        return FittedCandidate.unphysical.func(self) or self.idle
 
     @property
     def idle(self) -> str:

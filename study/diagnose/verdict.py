@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -162,10 +162,13 @@ def _decide(
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
         return one
     answer, left = _material(answer, sets, search, comparison)
-    verdict = _verdict_on(answer, left, comparison.prepared, asked)
+    good = [answer, *(r for r in sets if r.name in answer.tied_with)]
+    verdict = _verdict_on(good, left, comparison.prepared, asked)
+    if verdict == UNKNOWN and first is not None and _stands_out(first, comparison.prepared):
+        return replace(one, verdict=MISSING, rows=[first] + [r for r in rows if r is not first])
     if verdict != UNKNOWN:
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
-    return _Decision(verdict, rows, left, [answer, *(r for r in sets if r.name in answer.tied_with)])
+    return _Decision(verdict, rows, left, good)
 
 
 def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, asked: int) -> _Decision:
@@ -186,18 +189,20 @@ def _nearly_all(row: Ranked) -> bool:
     return row.gain.explained >= ENOUGH or row.response_error <= GOOD
 
 
-def _verdict_on(answer: Ranked, left: float, prepared: Prepared, asked: int) -> str:
-    """What the best set bears beside which so much is left."""
+def _verdict_on(sets: Sequence[Ranked], left: float, prepared: Prepared, asked: int) -> str:
+    """What the first of the sets that the record cannot tell apart bears, beside which so much is left."""
+    answer = sets[0]
     explained, one = answer.gain.explained, len(answer.entries) == 1
     if (explained >= ENOUGH or left <= GOOD) and not answer.wanders(asked):
         return MISSING if one else SEVERAL
-    if one:
-        return MISSING if _stands_out(answer, prepared) else UNKNOWN
+    if one and _stands_out(answer, prepared):
+        return MISSING
     if answer.unphysical or answer.unsteadiness > UNSTEADY:
         return UNKNOWN
-    if explained >= NEARLY:
+    if explained >= NEARLY and not one:
         return SEVERAL
-    return PARTLY_KNOWN if explained >= MOST and not answer.wanders(asked) else UNKNOWN
+    necessary = all(set(answer.names) <= set(row.names) for row in sets)
+    return PARTLY_KNOWN if explained >= MOST and necessary and not answer.wanders(asked) else UNKNOWN
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
@@ -224,7 +229,8 @@ def _material(
         if least is None:
             break
         explains = math.sqrt(max(least.prediction.error**2 - answer.prediction.error**2, 0.0))
-        if explains >= left:
+        # shapes of the motion do not see all that a model leaves: what stands above white noise counts as well
+        if explains >= max(left, answer.prediction.above_noise):
             break
         fewer = ranked.get(frozenset(least.names))
         answer = fewer if fewer is not None else rank([least], comparison, len(search.tried))[0]

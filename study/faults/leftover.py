@@ -16,6 +16,7 @@ from study.equations.possible_effects import candidate_entries
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_range import idle_effects
 from study.identify.time_domain.part_fit import JudgingRun, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Start
 from study.records.completion import derivative
@@ -31,7 +32,7 @@ from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
 SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
-FITTED = 3  # effects of the largest linear share that are fitted
+FITTED = 5  # effects of the largest linear share that are fitted
 CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
@@ -392,7 +393,8 @@ def effects_beside(more: FittedResidual, left: FittedResidual) -> list[str]:
 
 
 def unphysical(more: FittedResidual, left: FittedResidual) -> bool:
-    """Whether any of these is fitted outside of what makes it physical."""
+    """Whether any of these is fitted outside of what makes it physical, or of what the motion reaches."""
     model, names = more.fit.model, effects_beside(more, left)
     added, values = [e for e in model.terms if e.name in names], model.values
-    return any(e.term.physical(dict(zip(e.term.keys, map(values.get, e.keys), strict=True))) for e in added)
+    broken = any(e.term.physical(dict(zip(e.term.keys, map(values.get, e.keys), strict=True))) for e in added)
+    return broken or bool(idle_effects(more.fit, added, more.prepared))

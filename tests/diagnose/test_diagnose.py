@@ -259,7 +259,7 @@ def test_an_effect_of_a_decay_with_which_the_error_that_is_shown_grows_is_not_be
         prediction=SimpleNamespace(error=shown),
         response_error=shown,
         held_out=None,
-        interval=(1.0, 2.0),
+        effect=SimpleNamespace(interval=(1.0, 2.0)),
         p_value=1e-6,
         idle="",
     )

@@ -14,7 +14,8 @@ from study.diagnose.diagnosis_pictures import constancy_panels
 def test_a_constant_coefficient_is_drawn_at_one(coefficient):
     size = abs(coefficient)  # a curve is followed along the sign of its coefficient, as ``constancy.curves`` does
     curve = CoefficientCurve(np.array([1.0, 2.0]), np.full(2, size, dtype=np.complex128), np.full(2, 0.1 * size))
-    row = SimpleNamespace(name="van_der_pol_damping", coefficient=coefficient, flatness=curve, steadiness=None)
+    effect = SimpleNamespace(coefficient=coefficient, flatness=curve, steadiness=None)
+    row = SimpleNamespace(name="van_der_pol_damping", effect=effect)
     axes = Figure().subplots(1, 2)
     constancy_panels(axes[0], axes[1], [row])  # pyright: ignore[reportArgumentType]
     (container,) = axes[0].containers

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.diagnose.credibility import MotionRange
 from study.equations.terms import get
+from study.identify.time_domain.motion_range import MotionRange
 
 DT, N, REACH, OMEGA = 0.01, 1000, 0.01, 20.0  # ten seconds within +-10 mm, at up to 0.2 m/s
 TIME = DT * np.arange(N)

@@ -194,13 +194,14 @@ def test_any_alpha_and_any_k_after_the_fact(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_evidence_and_intervals_are_those_of_the_diagnosis() -> None:
     trial = make_trial(901, ("quadratic_damping",), 0.01, "displacement")
-    comparison, faults = findings.compared(trial, trial.completed)
-    assert faults == ()
+    found = findings.compared(trial, trial.completed)
+    comparison = found.comparison
+    assert found.faults == ()
     inside = findings.intervals(comparison, trial.truth)
     true = trial.truth.numbers()
     assert inside["asked"] == len(comparison.coefficients) == len(true)
     assert inside["held"] == sum(c.interval[0] <= true[c.key] <= c.interval[1] for c in comparison.coefficients)
-    lacking, _ = findings.compared(trial, trial.believed)
+    lacking = findings.compared(trial, trial.believed).comparison
     assert findings.intervals(lacking, trial.truth) == {"held": 0, "asked": 0}
     diagnosis = diagnose(lacking)
     said = findings.evidence_row(diagnosis, trial.hidden)
