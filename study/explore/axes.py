@@ -51,7 +51,7 @@ def sensor_axes(focus: Focus, columns: Mapping[str, Columns]) -> list[Row]:
     """Those of the panels that show one sensor, and the logarithmic ones of what is drawn of it."""
     kind, record, quantity = kind_of(focus.comparison), focus.comparison.record, focus.sensor.sensor.motion
     y, d, u, v = (in_text(s.unit) for s in (focus.response, focus.difference, focus.displacement, focus.velocity))
-    drive = in_text(record.unit(record.forces[0]))
+    drive = in_text(record.unit(record.forces[0])) if record.forces else ""  # a structure's decay has none
     labels = {
         "response_y": f"{quantity} / {y}", "close_y": f"{quantity} / {y}", "difference_y": f"difference / {d}",
         "spectrum_y": f"density / ({d}/√Hz)", "loop_u_y": f"force / {y}", "loop_v_y": f"force / {y}",

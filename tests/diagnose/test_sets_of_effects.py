@@ -56,7 +56,7 @@ def test_the_answer_is_the_first_of_the_sets(kind: str):
 
 
 def a_set(names: str, error: float) -> Any:
-    prediction = SimpleNamespace(error=error)
+    prediction = SimpleNamespace(error=error, above_noise=0.0)
     return SimpleNamespace(names=tuple(names), entries=tuple(names), prediction=prediction, fit=None)
 
 
