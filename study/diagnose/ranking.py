@@ -57,11 +57,19 @@ def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list
 
     ``white`` holds the whitened held-out residuals by name, ``asked`` is how many candidates there were.
     """
-    rows = sorted(rows, key=lambda r: float(np.mean(white[r.name] ** 2)))
-    simplest = min(_tie(rows, white), key=lambda r: _complexity(r, white[r.name], asked))
+    left = _beside_the_longest(white)
+    rows = sorted(rows, key=lambda r: left[r.name])
+    simplest = min(_tie(rows, white), key=lambda r: (*_against(r, asked), r.unknowns, left[r.name]))
     first = _unimpeached(rows, simplest, asked)
     rows = [first] + [r for r in rows if r is not first]
     return [replace(r, distance=distance(r, first, white), tied_with=tuple(_tied(r, rows, white))) for r in rows]
+
+
+def _beside_the_longest(white: Mapping[str, Floats]) -> dict[str, float]:
+    """Mean square of each residual over that of the longest on the same samples: one part is louder than the other."""
+    longest = max(white.values(), key=len)
+    tiny = np.finfo(float).tiny
+    return {k: float(np.mean(x**2) / max(float(np.mean(longest[: len(x)] ** 2)), tiny)) for k, x in white.items()}
 
 
 def distance(row: Ranked, other: Ranked, white: Mapping[str, Floats]) -> float:
@@ -107,11 +115,6 @@ def _believable(row: Ranked) -> bool:
 def _tie(rows: Sequence[R], white: Mapping[str, Floats]) -> list[R]:
     """The best candidate and those that the record cannot tell from it."""
     return [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
-
-
-def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
-    """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
-    return *_against(row, asked), row.unknowns, float(np.mean(white**2))
 
 
 def _against(row: Ranked, asked: int) -> tuple[bool, bool]:

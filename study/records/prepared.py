@@ -37,11 +37,11 @@ class Prepared:
 
     @cached_property
     def outputs(self) -> Outputs:
-        """What free runs are held against: several sensors in shares of their size in the fitting part."""
+        """What free runs are held against: several sensors in shares of their size, which no part of it changes."""
         sensors = self.sensors or (Sensor(ALONE, self.plan.response),)
         if len(sensors) == 1:
             return Outputs(sensors, (1.0,))
-        sizes = np.std(Outputs(sensors, (1.0,) * len(sensors)).measured(self.record, self.plan.fit), axis=0)
+        sizes = np.std(self.record.columns(sensors), axis=0)
         return Outputs(sensors, tuple((1.0 / np.where(sizes > 0.0, sizes, 1.0)).tolist()))
 
     @property

@@ -145,8 +145,8 @@ def test_the_diagnosis_is_the_same(pair: Told) -> None:
     assert [c.term.name for c in other.candidates] == [c.term.name for c in one.candidates]
     for a, b in zip(one.candidates, other.candidates, strict=True):
         assert b.response_error == pytest.approx(a.response_error, rel=1e-4)
-        assert b.coefficient == pytest.approx(a.coefficient, rel=1e-3)
-        assert b.unit == a.unit
+        assert b.effect.coefficient == pytest.approx(a.effect.coefficient, rel=1e-3)
+        assert b.effect.unit == a.effect.unit
     assert one.candidates[0].term.name == "cubic_stiffness"
 
 

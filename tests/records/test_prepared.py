@@ -65,3 +65,12 @@ def test_a_quiet_stretch_is_no_look_at_a_record():
         prepared = prepare_record(Record(0.01, {"force": steady, "displacement": motion}))
         plan = limited(prepared, 500).plan
         assert (plan.fit, plan.judge) == (fit, judge)
+
+
+def test_what_a_sensor_counts_is_the_same_whatever_part_is_fitted():
+    """Else what is left by two fits, one to all and one to a part, would be told in two measures."""
+    time = 0.01 * np.arange(4096)
+    sensors = {"a displacement": np.sin(3.0 * time) * (1.0 + time), "b displacement": np.sin(5.0 * time)}
+    record = Record(0.01, {"shaker": np.cos(time), **sensors}, name="growing")
+    prepared = whole(record)
+    assert prepared.with_fit(0, 512).outputs.weights == prepared.outputs.weights
