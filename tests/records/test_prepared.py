@@ -1,5 +1,7 @@
 """A record made ready: units, motions, parts, and what is judged of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,8 @@ def test_what_a_sensor_counts_is_the_same_whatever_part_is_fitted():
     """Else what is left by two fits, one to all and one to a part, would be told in two measures."""
     time = 0.01 * np.arange(4096)
     sensors = {"a displacement": np.sin(3.0 * time) * (1.0 + time), "b displacement": np.sin(5.0 * time)}
-    record = Record(0.01, {"shaker": np.cos(time), **sensors}, name="growing")
-    prepared = whole(record)
+    forces = {"shaker": np.cos(time)}
+    record = Record(0.01, forces | sensors, name="growing", coordinates=("a", "b"), forces=tuple(forces))
+    prepared = replace(whole(record), sensors=record.sensors)
+    assert len(prepared.outputs) == 2
     assert prepared.with_fit(0, 512).outputs.weights == prepared.outputs.weights
