@@ -29,6 +29,7 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.rivals import best_first, rivals
+from study.identify.time_domain.smoothness import smoothed
 from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
@@ -174,7 +175,7 @@ def compare(
         fit, known = fit_by(estimator, model, prepared)
     if fit is None:
         fit, *alike = best_first(search or fit_model(model, prepared, start), prepared)
-        fit = weighted(fit, prepared)
+        fit = smoothed(weighted(fit, prepared), prepared)
     else:
         alike = rivals(fit, prepared)
     report("free run")

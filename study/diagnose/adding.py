@@ -8,9 +8,11 @@ from study.compare.comparison import Comparison, compare
 from study.compare.running_on import running_on
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import search_base
+from study.equations.laid_variations import laid_entry
 from study.equations.model import ModelTerm, free
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import with_term
+from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import finished
 
 
@@ -22,8 +24,11 @@ def added(comparison: Comparison, term: Term | ModelTerm) -> Comparison:
     StudyError
         If the model with it has no finite response.
     """
-    prepared, entry = comparison.prepared, term if isinstance(term, ModelTerm) else free(term)
-    fit = finished(with_term(search_base(comparison), entry), prepared)
+    prepared = comparison.prepared
+    entry = laid_entry(term if isinstance(term, ModelTerm) else free(term), prepared)
+    # what changes along the record is seen in no part of it
+    base = baseline(comparison.fit, prepared) if entry.term.variation else search_base(comparison)
+    fit = finished(with_term(base, entry), prepared)
     return running_on(compare(comparison.model.with_term(entry), prepared, fit=fit))
 
 

@@ -3,7 +3,8 @@
 from study.equations import dimensions
 from study.equations.model import ModelTerm
 from study.equations.place import GROUND, Place
-from study.equations.term import QUANTITIES
+from study.equations.term import OF_VARIATION, QUANTITIES
+from study.equations.variation import ALONG_TIME
 from study.records.record import Record
 
 
@@ -30,6 +31,9 @@ def parameter_units(entry: ModelTerm, record: Record) -> dict[str, str]:
     """Units of the shape parameters of a term at its place, by their names."""
     found: dict[str, str] = {}
     for parameter in entry.term.parameters:
+        if parameter.quantity == OF_VARIATION and (varied := entry.term.variation) is not None:
+            found[parameter.name] = "s" if varied.along == ALONG_TIME else record.unit(varied.along)
+            continue
         powers = QUANTITIES[parameter.quantity]
         length = units_at(entry.place, record)[1]
         unit = dimensions.compose("", length, (-powers[0], -powers[1])).strip()

@@ -6,7 +6,7 @@ The text is parsed by Python's own parser and each part compared with a whitelis
 
 import ast
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from threading import Lock
 
 from study.equations.graph import Graph, Op
@@ -17,10 +17,10 @@ DEEPEST = 40
 ONE_AT_A_TIME = Lock()  # Python before 3.13 counts the depth of a tree that it makes for all threads together
 LARGEST_EXPONENT = 16.0
 
-FUNCTIONS = {  # with their numbers of arguments; a tangent is made of two others
+FUNCTIONS = {  # with their numbers of arguments; a tangent is made of two others, a spline of many
     "abs": (Op.ABS, 1), "sgn": (Op.SGN, 1), "sign": (Op.SGN, 1), "sin": (Op.SIN, 1), "cos": (Op.COS, 1),
     "tan": (Op.DIV, 1), "exp": (Op.EXP, 1), "log": (Op.LOG, 1), "sqrt": (Op.SQRT, 1), "tanh": (Op.TANH, 1),
-    "max": (Op.MAX, 2), "min": (Op.MIN, 2),
+    "max": (Op.MAX, 2), "min": (Op.MIN, 2), "spline": (Op.MAX, 5),
 }  # fmt: skip
 VARIABLES = ("u", "v", "t")  # in a formula these, and pi, are never columns of a record
 
@@ -142,6 +142,40 @@ class _Builder:
         if len(tree.args) != arity or tree.keywords:
             raise self.refuse(f"calls {name!r} with {len(tree.args)} arguments; it takes {arity}")
         arguments = [self.node(argument) for argument in tree.args]
+        if name == "spline":
+            return self.spline(arguments)
         if name == "tan":
             return self.graph.div(self.graph.unary(Op.SIN, arguments[0]), self.graph.unary(Op.COS, arguments[0]))
         return self.graph.unary(op, *arguments) if arity == 1 else self.graph.binary(op, *arguments)
+
+    def spline(self, arguments: Sequence[int]) -> int:
+        """``spline(s, first, last, count, j)``: cubic B-spline of knot j, of which there are ``count`` from 0 on.
+
+        The knots are equally far apart from ``first`` to ``last``, beyond which it is constant. Those at both ends hold
+        those beyond as well, so that a sum of all has no second derivative there (a natural spline), is 1 with
+        coefficients of 1, and a line with coefficients on a line.
+        """
+        graph, (variable, *given) = self.graph, arguments
+        known = [graph.constant_value(node) for node in given]
+        first, last, count, j = (math.nan if x is None else x for x in known)
+        if not (last > first and count >= 2 and 0 <= j < count and count == int(count) and j == int(j)):
+            raise self.refuse("has a spline of no knot; expected spline(s, first, last, count, j) with 0 <= j < count")
+        scaled = graph.mul(graph.sub(variable, graph.const(first)), graph.const((count - 1.0) / (last - first)))
+        scaled = graph.binary(Op.MIN, graph.binary(Op.MAX, scaled, graph.const(0.0)), graph.const(count - 1.0))
+        total = self.bump(scaled, j)
+        beyond = {0.0: (-1.0, 2.0), 1.0: (-1.0, -1.0)}
+        for end, direction in ((0.0, 1.0), (count - 1.0, -1.0)):
+            if abs(j - end) in beyond:
+                place, weight = beyond[abs(j - end)]
+                bump = self.bump(scaled, end + direction * place)
+                total = graph.add(total, graph.mul(graph.const(weight), bump))
+        return total
+
+    def bump(self, scaled: int, centre: float) -> int:
+        """The cubic B-spline about a place, with knots one apart: ``(max(2 - |x|, 0)^3 - 4 max(1 - |x|, 0)^3)/6``."""
+        graph, zero = self.graph, self.graph.const(0.0)
+        away = graph.unary(Op.ABS, graph.sub(scaled, graph.const(centre)))
+        outer, inner = (
+            graph.power(graph.binary(Op.MAX, graph.sub(graph.const(reach), away), zero), 3.0) for reach in (2.0, 1.0)
+        )
+        return graph.mul(graph.sub(outer, graph.mul(graph.const(4.0), inner)), graph.const(1.0 / 6.0))

@@ -9,6 +9,7 @@ A file holds ``name`` and ``terms``; an entry of ``terms`` is a name, or a mappi
       - {term: dead_band, u_g: 0.0025}                   # shape parameter given
       - {term: periodic_stiffness, f_m: 1.0, amplitude: 177.7, phase: 0.0}
       - {term: bracket, force: "u*abs(u) + 0.1*v**3"}    # the user's own
+      - {term: linear_stiffness, varies_with: time}      # beside the entry whose coefficient changes (variation_entry)
 
 A structure has ``coordinates`` and ``forces`` as well, and each of its terms a place (``layout``).
 
@@ -22,10 +23,9 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
-from study.equations import layout, terms
+from study.equations import layout, terms, variation_entry
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
@@ -33,7 +33,6 @@ from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError, at, expect
 from study.support.files import read_text, recover
-from study.support.numbers import LARGEST, SMALLEST
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 LONGEST_NAME = 100
@@ -59,7 +58,7 @@ def parse_model(text: str, source: Path) -> Model:
         if top is None:
             content = "is empty" if document is None else f"holds {shown(document)}"
             raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
-        refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
+        yaml_text.refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
         name = top.get("name", source.stem)
         if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
             raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
@@ -77,6 +76,7 @@ def parse_model(text: str, source: Path) -> Model:
             layout.check(model)
         elif fault := repeated_force(model):
             raise StudyError(fault)
+        variation_entry.refuse_loose_changes(model)
         return model
 
 
@@ -106,11 +106,16 @@ def format_entry(entry: ModelTerm) -> str:
     for key, value in known.items():
         if not math.isfinite(value):
             raise StudyError(f"{key} of {entry.name} is {value}; only finite numbers can be written")
-    fields = {"term": scalar(entry.term.name)} | layout.place_fields(entry.place)
-    if entry.term.name not in terms.LIBRARY:
-        fields["force"] = json.dumps(entry.term.components[0].shape)
+    varied = entry.term.variation
+    own_term = entry.term if varied is None else varied.of
+    fields = {"term": scalar(own_term.name)} | layout.place_fields(entry.place)
+    if own_term.name not in terms.LIBRARY:
+        fields["force"] = json.dumps(own_term.components[0].shape)
+    fields |= {} if varied is None else variation_entry.variation_fields(varied)
     parameters = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
     fields |= {name: repr(float(known[key])) for name, key in parameters.items() if key in known}
+    if varied is not None:
+        return _flow(fields | variation_entry.changes_field(entry))
     own = zip(entry.term.symbols, entry.symbols, strict=True)
     coefficients = {symbol: repr(float(known[key])) for symbol, key in own if key in known}
     if coefficients and len(entry.term.symbols) == 1:
@@ -195,9 +200,12 @@ def entry_from(item: Mapping[object, object]) -> ModelTerm:
         raise StudyError(f"force of {name!r} is {shown(force)}; expected a formula in quotes")
     term = terms.custom(name, force) if isinstance(force, str) else terms.get(name)
     own = ("force",) if term.name not in terms.LIBRARY else ()
+    if "varies_with" in item:
+        plain = {key: value for key, value in item.items() if key not in own}
+        return variation_entry.entry_of(term, plain)
     amount = ("amplitude", "phase") if _phasor(term) else ("value",)
-    refuse_unknown(item, ("term", *own, *amount, "values", *(p.name for p in term.parameters)), name)
-    parameters = [_number(item, p.name, name) for p in term.parameters]
+    yaml_text.refuse_unknown(item, ("term", *own, *amount, "values", *(p.name for p in term.parameters)), name)
+    parameters = [yaml_text.number_of(item, p.name, name) for p in term.parameters]
     for parameter, value in zip(term.parameters, parameters, strict=True):
         if value is not None and value <= 0.0 and not parameter.signed:
             raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
@@ -222,40 +230,16 @@ def _coefficients(term: Term, item: Mapping[object, object]) -> tuple[float | No
         if given is None:
             like = ", ".join(f"{s}: 1.0" for s in term.symbols)
             raise StudyError(f"values of {term.name} is {shown(item['values'])}; expected a mapping such as {{{like}}}")
-        refuse_unknown(given, term.symbols, f"values of {term.name}")
-        return tuple(_number(given, symbol, term.name) for symbol in term.symbols)
+        yaml_text.refuse_unknown(given, term.symbols, f"values of {term.name}")
+        return tuple(yaml_text.number_of(given, symbol, term.name) for symbol in term.symbols)
     if not _phasor(term):
-        return (_number(item, "value", term.name), *(None for _ in term.symbols[1:]))
-    amplitude, phase = _number(item, "amplitude", term.name), _number(item, "phase", term.name)
+        return (yaml_text.number_of(item, "value", term.name), *(None for _ in term.symbols[1:]))
+    amplitude, phase = yaml_text.number_of(item, "amplitude", term.name), yaml_text.number_of(item, "phase", term.name)
     if amplitude is None and phase is None:
         return (None, None)
     if amplitude is None or phase is None:
         raise StudyError(f"{term.name} gives {ways[0]!r} alone; expected amplitude and phase together, or neither")
     return (amplitude * math.cos(phase), 0.0 - amplitude * math.sin(phase))  # 0 - 0, not -0, at phase 0
-
-
-def _number(item: Mapping[object, object], key: str, owner: str) -> float | None:
-    """A finite number of usual size, or None if the key is left out."""
-    if key not in item:
-        return None
-    value = item[key]
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        with suppress(OverflowError):
-            if value == 0 or SMALLEST <= abs(float(value)) <= LARGEST:
-                return float(value)
-    if value is None:
-        raise StudyError(f"{key} of {owner} is empty; give a number, or leave the key out to have it estimated")
-    like = f"such as 355.3 or 2.0e7 (0, or {SMALLEST:g} to {LARGEST:g} in size)"
-    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number {like}")
-
-
-def refuse_unknown(item: Mapping[object, object], allowed: Sequence[str], owner: str) -> None:
-    """Refuse a mapping with a key that it cannot have; the message tells the nearest one."""
-    for key in item:
-        if key not in allowed:
-            near = get_close_matches(shown(key).strip("'"), allowed, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(allowed)}"
-            raise StudyError(f"{owner} has the unknown key {shown(key)}; {hint}")
 
 
 def _flow(fields: Mapping[str, str]) -> str:

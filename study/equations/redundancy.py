@@ -1,5 +1,7 @@
 """A user's own term whose force is zero, or a combination of those of other terms in the model."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from study.equations import formulas
@@ -21,6 +23,7 @@ def repeated_force(model: Model) -> str | None:
     It is compared with terms whose coefficient is to be estimated. Terms with a shape parameter or a memory are left
     out, as their forces depend on values that are not known yet.
     """
+    model = replace(model, terms=tuple(t for t in model.terms if t.term.variation is None))  # along time it is another
     if all(t.name in LIBRARY for t in model.terms):
         return None
     names, values = _forces(model)

@@ -4,9 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from study.equations import dimensions, formulas
+
+if TYPE_CHECKING:
+    from study.equations.variation import Variation
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,7 @@ class Component:
 Places = Literal[
     "quantiles of |u|", "quantiles of u", "times of the motion", "per amplitude", "shares of the one before",
     "shares of the velocity", "lines of the modulation", "lines of the residual", "pitches of the residual",
+    "quantiles of what it varies with",
 ]  # fmt: skip
 
 
@@ -45,7 +49,7 @@ class ShapeParameter:
     """A shape parameter, given or estimated."""
 
     name: str  # in formulas
-    quantity: str  # its unit: ``length``, ``frequency``, ``time``, ``velocity`` or ``1/length``
+    quantity: str  # its unit: ``length``, ``frequency``, ``time``, ``velocity``, ``1/length`` or that of a channel
     meaning: str  # to people
     search: Search  # where a fit looks for it
     # Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the parameter
@@ -98,6 +102,7 @@ class Term:
     either_sign: bool = False  # as hardening and softening do: a trial then draws its sign
     placeless: bool = False  # whether it is the same wherever the system rests, but for another linear stiffness
     angle: bool = False  # whether its displacement is an angle, in radians: it is no effect of a coordinate in metres
+    variation: "Variation | None" = None  # where it is what the coefficients of another term change by
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -164,6 +169,9 @@ class Term:
 
     def unit(self, symbol: str, force: str, length: str) -> str:
         """Unit of one coefficient for a record with these units of force and length."""
+        if self.variation is not None:  # a change is in the unit of what changes
+            of, place = self.variation.of, self.symbols.index(symbol) * len(self.variation.of.symbols)
+            return of.unit(of.symbols[place // len(self.symbols)], force, length)
         component = next(c for c in self.components if c.symbol == symbol)
         known = {p.name: QUANTITIES[p.quantity] for p in self.parameters}
         known |= {"z": STATE_DIMENSIONS} if self.state else {}
@@ -173,11 +181,13 @@ class Term:
         return dimensions.compose(force, length, powers)
 
 
+OF_VARIATION = "of what it varies with"  # time, or a channel of any unit
 QUANTITIES = {
     "length": dimensions.VARIABLES["u"],
     "time": dimensions.VARIABLES["t"],
     "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
     "velocity": dimensions.VARIABLES["v"],
     "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
+    OF_VARIATION: dimensions.NONE,
 }
 STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements

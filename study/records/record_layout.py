@@ -63,6 +63,7 @@ class KindOfTest:
     anew: float = (
         0.0  # periods after which a free motion begins anew; 0 where it runs on through the other part's blocks
     )
+    varies: bool = False  # a coefficient changes along it: each part has to see all of what it changes with
 
 
 def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None = None) -> Prepared:
@@ -70,7 +71,8 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
 
     A single stretch under a force is fitted in its first half and judged in its second. Every other block is judged of
     several stretches, of a free decay, whose second half is quiet, of a prescribed motion, which is often a program of
-    amplitudes and frequencies, of a sweep or dwells, whose halves have other frequencies, and where the user says so.
+    amplitudes and frequencies, of a sweep or dwells, whose halves have other frequencies, where a coefficient of the
+    model varies, and where the user says so.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     free = not (kind.prescribed or forced)
     anew = kind.anew if free else 0.0
     several = len(records) > 1 or len(layout.use) > 1
-    by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)
+    by_itself = (free or kind.prescribed or kind.varies) and not (layout.explicit or kind.unbroken)
     turns = several or layout.alternate or by_itself
     if not (turns or layout.use or kind.drifts):
         with at(records[0].name):

@@ -121,26 +121,33 @@ def _p_value(products: Floats) -> float:
     return float(np.sum(ways[int(np.sum(rank[products > 0.0])) :])) / 2.0**n
 
 
-def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0, keys: int = 0) -> Floats:
+def clustered_covariance(
+    jacobian: Floats, residual: Floats, others: int = 0, keys: int = 0, beside: Floats | None = None
+) -> Floats:
     """Covariance of least-squares estimates when the residual is correlated in time or with the motion.
 
     The sandwich ``H^-1 (sum over blocks g_b g_b^T) H^-1`` with ``g_b = J_b^T e_b`` and ``H = J^T J``
     (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
     Jacobian are beside. Blocks tell the variances of any number of estimates, but the correlations of few: where there
-    are not five blocks to each of the ``keys``, as of a structure, correlations are those of white noise.
+    are not five blocks to each of the ``keys``, as of a structure, correlations are those of white noise. Rows
+    ``beside`` the Jacobian say what was known of the estimates before, with errors as large as those of a sample
+    (the covariance is then that of estimates given the samples, which allows for what the rows pull them aside).
     """
     scale = length_or_one(jacobian)
     j = jacobian / scale
-    inverse = normal_inverse(j.T @ j)
+    known = np.zeros((0, len(scale))) if beside is None else beside / scale
+    inverse = normal_inverse(j.T @ j + known.T @ known)
     count = max(2, min(BLOCKS, len(residual) // SHORTEST))
     size = len(residual) // count
     blocks = np.einsum(
         "bsp,bs->bp", j[: size * count].reshape(count, size, -1), residual[: size * count].reshape(count, size)
     )
     steps = blocks @ inverse  # what each block moves the estimates by: of their products no variance is negative
-    sandwich = steps.T @ steps * count / (count - 1)
+    noise = float(residual @ residual) / max(len(residual) - len(scale) - others, 1)
+    rows = known @ inverse
+    sandwich = steps.T @ steps * count / (count - 1) + noise * rows.T @ rows
     variance = np.diag(sandwich)
-    white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale) - others, 1)
+    white = np.diag(inverse) * noise
     larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
     if 5 * keys > count:
         size = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))

@@ -5,12 +5,16 @@ and aliases (which can grow without bound) and tags (which call for Python objec
 """
 
 import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from difflib import get_close_matches
 from typing import Any, cast
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
 from study.support.errors import StudyError, expect
+from study.support.numbers import LARGEST, SMALLEST
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
 DEEPEST = 8
@@ -86,6 +90,30 @@ def scalar(text: str) -> str:
     """A text as YAML: plain where it reads back as itself, otherwise in double quotes."""
     plain = text.isidentifier() and text.isascii() and _yaml().load(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
+
+
+def number_of(item: Mapping[object, object], key: str, owner: str) -> float | None:
+    """A finite number of usual size, or None if the key is left out."""
+    if key not in item:
+        return None
+    value = item[key]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        with suppress(OverflowError):
+            if value == 0 or SMALLEST <= abs(float(value)) <= LARGEST:
+                return float(value)
+    if value is None:
+        raise StudyError(f"{key} of {owner} is empty; give a number, or leave the key out to have it estimated")
+    like = f"such as 355.3 or 2.0e7 (0, or {SMALLEST:g} to {LARGEST:g} in size)"
+    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number {like}")
+
+
+def refuse_unknown(item: Mapping[object, object], allowed: Sequence[str], owner: str) -> None:
+    """Refuse a mapping with a key that it cannot have; the message tells the nearest one."""
+    for key in item:
+        if key not in allowed:
+            near = get_close_matches(shown(key).strip("'"), allowed, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(allowed)}"
+            raise StudyError(f"{owner} has the unknown key {shown(key)}; {hint}")
 
 
 def with_entry(text: str, key: str, entry: str) -> str:

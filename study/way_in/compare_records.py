@@ -12,6 +12,7 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.running_on import has_lost_its_way
 from study.equations.common_factor import on_moving_ground, per_unit_mass
 from study.equations.equations_of_motion import has_spring
+from study.equations.laid_variations import with_laid_variations
 from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
@@ -51,7 +52,9 @@ def made_ready(
     prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
     drifts = not (prescribed or model.modal or has_spring(model))
     anew = ANEW if len(model.coordinates) > 1 else 0.0
-    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew))
+    varies = any(entry.term.variation for entry in model.terms)  # along all of the record
+    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew, varies))
+    model = with_laid_variations(model, prepared)
     lacks = _unseen(model, prepared)
     prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)

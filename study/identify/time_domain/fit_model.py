@@ -89,9 +89,11 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         return settled(
             fit_part(model, prepared, model.held_keys, start, steps=rough_steps(model, prepared, start)), prepared
         )
-    unknown = tuple(t for t in model.terms if None in t.parameters)
+    changes = tuple(t for t in model.terms if t.term.variation and None in t.coefficients)
+    unknown = (*(t for t in model.terms if None in t.parameters and t not in changes), *changes)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = shape_search.searched_stretch(known, prepared) if unknown and not model.named else prepared
+    short = unknown and not (model.named or changes)  # a short stretch tells of no change along a long one
+    look = shape_search.searched_stretch(known, prepared) if short else prepared
     fit = first_fit(known, look) if model.named else _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)

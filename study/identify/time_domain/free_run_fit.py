@@ -7,7 +7,7 @@ minimised by the method of Levenberg and Marquardt (``levenberg_marquardt``) wit
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class FreeRunFit:
         Autoregressive coefficients of each sensor's noise, with which the residual was weighted; empty for white noise.
     undecided : tuple of str
         Keys that the record does not show, or cannot tell apart.
+    penalty : array, shape (rows, p)
+        Rows times the estimates that were minimised beside the residual (``smoothness``); none without smooth curves.
     elsewhere : tuple of FreeRunFit
         Where the other starts of the search led whose best this is, as far as they were followed (``rivals``).
     """
@@ -83,6 +85,7 @@ class FreeRunFit:
     outputs: Outputs = DISPLACEMENT
     noise: tuple[Floats, ...] = ()
     undecided: tuple[str, ...] = ()
+    penalty: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     elsewhere: tuple["FreeRunFit", ...] = ()
 
     @property
@@ -147,6 +150,7 @@ def fit_free_run(
     offset: float = OFFSET,
     noise: tuple[Floats, ...] = (),
     lost: Bools | None = None,
+    penalty: Floats | None = None,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -177,6 +181,8 @@ def fit_free_run(
         them; the residual filtered with them is minimised. White noise by default, and wherever there are restarts.
     lost : bool array, shape (samples of the record,) or (samples of the record, s), optional
         Samples that say nothing: their residual counts as zero.
+    penalty : array, shape (rows, keys), optional
+        Rows whose products with what is estimated, in the order of the model, are minimised as well.
 
     Raises
     ------
@@ -213,7 +219,17 @@ def fit_free_run(
     coupled = any(t.term.name == "inertia" and t.place.kind != "at" and set(t.keys) & set(begin) for t in model.terms)
     weights = _weights(continuity, measured, states)
     problem = _Problem(
-        run, model if coupled else None, model.modal, outputs, measured, free, weights, positive, noise, kept
+        run,
+        model if coupled else None,
+        model.modal,
+        outputs,
+        measured,
+        free,
+        weights,
+        positive,
+        noise,
+        kept,
+        np.zeros((0, len(begin))) if penalty is None else penalty,
     )
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
@@ -258,6 +274,7 @@ class _Problem:
     positive: Mapping[str, float]  # keys above zero, and how far they may run off
     noise: tuple[Floats, ...]
     kept: Floats | None  # 0 for samples that are lost, 1 for others
+    penalty: Floats  # rows beside the residual, shape (rows, keys)
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
@@ -289,6 +306,11 @@ class _Problem:
             residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]
         residual, jacobian = (self.outputs.whitened(x, self.noise) for x in (residual, jacobian))
         begins = (0, *(len(self.outputs) * cut for cut in self.run.cuts))
+        if len(self.penalty):
+            keys, beside = len(self.run.keys), np.zeros((len(self.penalty), jacobian.shape[1]))
+            beside[:, :keys] = self.penalty
+            residual = np.concatenate([residual, -self.penalty @ x[:keys]])
+            jacobian = np.concatenate([jacobian, beside])
         return point_at(x, residual, jacobian, len(self.run.keys), begins, continuity)
 
     def residual(self, x: Floats) -> Floats:
@@ -322,6 +344,7 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
         outputs=problem.outputs,
         noise=problem.noise,
         undecided=tuple(unclear),
+        penalty=problem.penalty,
         converged=end.converged,
         iterations=end.iterations,
         message=message,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.equations.model import ModelTerm
-from study.equations.term import Term
+from study.equations.term import OF_VARIATION, Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of
 from study.records.prepared import Prepared
@@ -35,7 +35,7 @@ class MotionRange:
         u, v = self.motion @ direction
         for parameter in term.parameters:
             value, error = values.get(parameter.name, math.nan), errors.get(parameter.name, 0.0)
-            if math.isnan(value) or parameter.relative or parameter.quantity == "frequency":
+            if math.isnan(value) or parameter.relative or parameter.quantity in ("frequency", OF_VARIATION):
                 continue
             low, high = self._limits(parameter.quantity, u, v)
             if parameter.signed and parameter.quantity == "length":

@@ -39,6 +39,7 @@ def fit_part(
     initial: Floats | None = None,
     offset: float = OFFSET,
     noise: tuple[Floats, ...] = (),
+    penalty: Floats | None = None,
 ) -> FreeRunFit:
     """Fit what is not held on the fitting part, from ``start`` where it has a value and from the model elsewhere.
 
@@ -52,6 +53,7 @@ def fit_part(
         model, prepared.record, start=begin, held=held, outputs=prepared.outputs, steps_per_sample=steps,
         span=prepared.plan.fit, max_iterations=max_iterations, offset=offset,
         initial="estimate" if initial is None else initial, noise=noise, lost=prepared.lost,
+        penalty=penalty,
     )  # fmt: skip
 
 
@@ -103,7 +105,12 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
     ``jacobian`` is what :func:`linearise` gives of the fit.
     """
     others = fit.initial.size if fit.restarts and jacobian.shape[1] == len(fit.keys) else 0
-    return clustered_covariance(fit.whitened(jacobian), fit.whitened(fit.residual), others, len(fit.keys))
+    columns, residual = fit.whitened(jacobian), fit.whitened(fit.residual)
+    if len(fit.penalty):
+        beside = np.zeros((len(fit.penalty), columns.shape[1]))
+        beside[:, : len(fit.keys)] = fit.penalty
+        return clustered_covariance(columns, residual, others, len(fit.keys), beside)
+    return clustered_covariance(columns, residual, others, len(fit.keys))
 
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:

@@ -38,6 +38,7 @@ SEARCHED = 4096  # samples that a search for open shape parameters looks at, if 
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
+VARIED = "quantiles of what it varies with"
 STARTS = 4  # points of the search that start a fit
 CUTOFF = 1e-8  # of the largest singular value
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
@@ -224,6 +225,8 @@ def points_to_try(entry: ModelTerm, u: Floats, base: Baseline) -> list[tuple[flo
     def lines(kind: str, shifts: Floats) -> Floats:
         if kind == PITCHES:
             return pitches(u, entry.place, base, shifts)
+        if kind == VARIED and entry.term.variation is not None:
+            return np.quantile(entry.term.variation.values(base.prepared.record)[slice(*base.fit.span)], shifts)
         found = modulation_lines(u, entry.place, base) if kind == MODULATION else residual_lines(base)
         return np.add.outer(np.array(found), shifts).ravel() / (len(u) * base.prepared.dt)
 

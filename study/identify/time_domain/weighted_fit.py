@@ -12,6 +12,7 @@ import numpy as np
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import continued, settled
+from study.identify.time_domain.smoothness import smoothed
 from study.records.outputs import Noise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
@@ -23,10 +24,10 @@ RUNS = 20  # free runs of the weighted fit, which begins at the plain one
 
 
 def finished(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit of a search as all that is shown rests on it: to the whole fitting part, settled, and weighted."""
-    if fit.noise and fit.span == prepared.plan.fit:
+    """The fit of a search as all that is shown rests on it: the whole fitting part, settled, weighted and smooth."""
+    if (fit.noise or len(fit.penalty)) and fit.span == prepared.plan.fit:
         return fit
-    return weighted(settled(continued(fit, prepared), prepared), prepared)
+    return smoothed(weighted(settled(continued(fit, prepared), prepared), prepared), prepared)
 
 
 def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
