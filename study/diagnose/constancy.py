@@ -119,7 +119,8 @@ def curves(
     """
     columns = [fit.keys.index(s) for s in entry.symbols]
     direction = fit.values[columns]
-    size = float(np.linalg.norm(direction))
+    # a curve's coefficient is its largest change
+    size = float(np.max(np.abs(direction)) if entry.term.variation else np.linalg.norm(direction))
     if size == 0.0:
         return None, None
     sensors = len(fit.outputs)

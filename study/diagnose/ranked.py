@@ -157,6 +157,9 @@ def amount(
     parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
     if len(entry.symbols) == 1:
         return values[entry.symbols[0]], errors[entry.symbols[0]], parameters, parameter_errors
+    if entry.term.variation is not None:  # a curve: its largest change
+        most = max(entry.symbols, key=lambda symbol: abs(values[symbol]))
+        return values[most], errors[most], parameters, parameter_errors
     a, b = (values[s] for s in entry.symbols)
     size = math.hypot(a, b)
     direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])

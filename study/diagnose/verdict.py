@@ -11,7 +11,7 @@ from study.compare import dependence
 from study.compare.comparison import Comparison
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
-from study.diagnose import candidates
+from study.diagnose import candidates, varying_candidates
 from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -97,6 +97,13 @@ def diagnose(
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
     tried = candidates.try_all(entries, base, progress)
+    suspect = varying_candidates.suspected(comparison, tried)
+    if suspect is not None:  # what changes along a record is asked for where both parts see all of it
+        if suspect.comparison is not comparison:
+            comparison, base = suspect.comparison, search_base(suspect.comparison)
+            tried = candidates.try_all(entries, base, progress)
+        tried += varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
+        entries += suspect.entries
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
     decision = _decide(rows, tried, base, comparison, asked, progress)

@@ -287,6 +287,25 @@ def strung_together(
     return Prepared(record, plan, band, 0, said, sensors=tuple(sensors))
 
 
+def in_turns(prepared: Prepared) -> Prepared:
+    """A single stretch whose every other block is fitted and judged, in place of one part after the other.
+
+    Raises
+    ------
+    StudyError
+        If it is too short for that.
+    """
+    record, (fit, judge) = prepared.record, (prepared.plan.fit, prepared.plan.judge)
+    completed = CompletedRecord(record, prepared.band, prepared.edge, prepared.notes)
+    sensors = prepared.outputs.sensors
+    parts = alternating([sure(completed, min(fit[0], judge[0]), max(fit[1], judge[1]))], sensors)
+    strung = strung_together(*parts, sensors, [completed], [_said(*parts, 1, anew=False)])
+    lost = prepared.lost
+    if lost is not None:
+        lost = np.concatenate([lost[s.first : s.last] for s in strung.record.stretches])
+    return replace(strung, low=prepared.low, lost=lost, every=prepared.every)
+
+
 def records_judged(prepared: Prepared) -> tuple[Prepared, ...]:
     """A prepared record of several records, each time with the samples of one of them to judge; none of one record.
 
