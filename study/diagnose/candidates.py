@@ -4,6 +4,7 @@ Where few are asked for, as of a single mass, all are fitted. A structure has ma
 at which of them which effects are worth a fit (``shape_search``).
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,6 +28,7 @@ AT_EACH_PLACE = 2  # ... with so many at each place that explain this share of w
 PROMISING = 0.3
 OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
 Progress = Callable[[int, int], None]  # called with how many candidates were fitted, and of how many
+ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 
 
@@ -72,6 +74,14 @@ class FittedCandidate:
     def power(self) -> float:
         """Mean square of what it leaves on both parts."""
         return float(np.mean(np.concatenate([self.fit.residual, self.prediction.residual]) ** 2))
+
+    @property
+    def numerical(self) -> float:
+        """Rms error of the integration itself; of a force that takes none, that of finding a least sum of squares."""
+        prediction = self.prediction
+        own = prediction.numerical * np.array(prediction.prepared.outputs.weights)
+        size = float(np.std(prediction.above(prediction.prepared.judged)))
+        return max(float(np.sqrt(np.mean(own**2))), ROUNDED * size)
 
     @cached_property
     def unphysical(self) -> str:

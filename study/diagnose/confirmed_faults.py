@@ -1,15 +1,16 @@
 """Faults of the measurement in the light of a diagnosis."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
+from study.diagnose.varying_candidates import promise
 from study.diagnose.verdict import Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
-from study.faults.fault import Fault
+from study.faults.fault import GAIN_CHANGE, Fault
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
 
@@ -39,7 +40,8 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
-    answer = first.diagnosis.answer
+    first = _changing_instead(first, found) or first
+    accounted, answer = first.accounted, first.diagnosis.answer
     if answer is None or (first.diagnosis.left <= TOLERANCE and not (accounted.faults and len(answer.entries) > 1)):
         return first
     model = accounted.comparison.model
@@ -54,6 +56,27 @@ def diagnose_accounted(
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _changing_instead(first: Diagnosed, found: Callable[[Accounted], Diagnosed]) -> Diagnosed | None:
+    """The diagnosis where a coefficient changes along the record, not the gain of a sensor; None if it is no better.
+
+    Either makes the response grow or fall along the record: the one that leaves less stands.
+    """
+    others = [f for f in first.accounted.faults if f.fault != GAIN_CHANGE or f.held or not f.corrected]
+    if len(others) == len(first.accounted.faults):
+        return None
+    try:
+        accounted = first.accounted.corrected_for(others)
+        if promise(accounted.comparison) is None:
+            return None
+        again = found(accounted)
+    except StudyError:
+        return None
+    before, answer = first.diagnosis, again.diagnosis.answer
+    least = before.comparison.prediction.error if before.answer is None else before.answer.response_error
+    changes = answer is not None and any(entry.term.variation for entry in answer.entries)
+    return again if changes and answer is not None and answer.response_error < least else None
 
 
 def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:

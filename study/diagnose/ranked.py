@@ -20,8 +20,6 @@ from study.support.arrays import Floats
 from study.support.statistics import Gain
 from study.support.thresholds import ENOUGH, GOOD, NEARLY, UNSTEADY
 
-ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely
-
 
 @dataclass(frozen=True, eq=False)
 class FittedEffect:
@@ -84,14 +82,6 @@ class Ranked(FittedCandidate):
     def residual(self) -> Floats:
         """Held-out residual, stacked."""
         return self.prediction.residual
-
-    @property
-    def numerical(self) -> float:
-        """Rms error of the integration itself; of a force that takes none, that of finding a least sum of squares."""
-        prediction = self.prediction
-        own = prediction.numerical * np.array(prediction.prepared.outputs.weights)
-        size = float(np.std(prediction.above(prediction.prepared.judged)))
-        return max(float(np.sqrt(np.mean(own**2))), ROUNDED * size)
 
     @property
     def response_error(self) -> float:

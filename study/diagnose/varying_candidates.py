@@ -5,7 +5,7 @@ second. So where the sensitivities of the fitted model promise that a coefficien
 every other block judged, and all candidates are asked there, nonlinear ones as rivals.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from study.support import statistics
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
-from study.support.thresholds import ALPHA, TOLERANCE, K
+from study.support.thresholds import ALPHA, NEARLY, TOLERANCE, K
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,45 @@ class Suspect:
     entries: list[ModelTerm]  # in each shape that is asked for
 
 
-def suspected(comparison: Comparison, tried: Sequence[FittedCandidate]) -> Suspect | None:
-    """What may change, as the sensitivities of the fitted model promise beside what was ``tried``; None for nothing."""
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What changes of coefficients could explain of what a fitted model leaves, no more than its sensitivities tell."""
+
+    comparison: Comparison
+    fit: FreeRunFit  # of the model as it is, where every other block is judged
+    prepared: Prepared  # the record laid out so
+    shares: dict[ModelTerm, float]  # of each curve that no chance explains as much with
+
+    @property
+    def most(self) -> float:
+        return max(self.shares.values(), default=0.0)
+
+    @property
+    def alone(self) -> bool:
+        """Whether a change explains so much that others are asked for beside it from the start."""
+        return self.most > PROMISING
+
+    def beside(self, tried: Sequence[FittedCandidate]) -> bool:
+        """Whether it explains as much as half of what the best of other effects does, as fitted to both parts."""
+        left = np.concatenate([self.comparison.fit.residual, self.comparison.prediction.residual])
+        power = float(np.mean(left**2))
+        least = min((c.power for c in tried if not c.unphysical), default=power)
+        return self.most > 0.0 and power > 0.0 and self.most >= 0.5 * (1.0 - least / power)
+
+    def suspect(self) -> Suspect | None:
+        """The changes that are worth a fit; None where the model does not follow the record laid out so."""
+        comparison = self.comparison
+        chosen = [entry for entry, share in self.shares.items() if share >= PROMISING * self.most]
+        try:
+            if self.prepared is not comparison.prepared:
+                comparison = compare(comparison.model, self.prepared, fit=finished(self.fit, self.prepared))
+            return Suspect(comparison, [shaped for entry in chosen for shaped in _shapes(entry, self.prepared)])
+        except StudyError:
+            return None
+
+
+def promise(comparison: Comparison) -> Promise | None:
+    """What changes of the model's coefficients promise; None where nothing says that any of them may change."""
     prepared, fit = comparison.prepared, comparison.fit
     entries = _curves(comparison.fit.model, prepared)
     if not entries or fit.restarts or fit.model.modal:
@@ -51,16 +88,8 @@ def suspected(comparison: Comparison, tried: Sequence[FittedCandidate]) -> Suspe
     except StudyError:
         return None
     most = max(shares.values(), default=0.0)
-    if most <= 0.0 or np.sqrt(most) * comparison.prediction.error <= TOLERANCE or most < 0.5 * _best(comparison, tried):
-        return None
-    chosen = [e for e in entries if shares.get(e.name, 0.0) >= PROMISING * most]
-    try:
-        if turns is not prepared:
-            again = finished(rough, turns)
-            comparison = compare(comparison.model, turns, fit=again)
-    except StudyError:
-        return None
-    return Suspect(comparison, [shaped for entry in chosen for shaped in _shapes(entry, turns)])
+    seen = most > 0.0 and np.sqrt(most) * comparison.prediction.error > TOLERANCE
+    return Promise(comparison, rough, turns, shares) if seen else None
 
 
 def _curves(model: Model, prepared: Prepared) -> list[ModelTerm]:
@@ -98,7 +127,7 @@ def _shapes(entry: ModelTerm, prepared: Prepared) -> list[ModelTerm]:
     return [entry, *(laid_entry(free(term, entry.place), prepared) for term in others)]
 
 
-def _promised(entries: Sequence[ModelTerm], base: Baseline, fit: FreeRunFit) -> dict[str, float]:
+def _promised(entries: Sequence[ModelTerm], base: Baseline, fit: FreeRunFit) -> dict[ModelTerm, float]:
     """Share of what a model leaves that each change could explain, of those that no chance does."""
     model = fit.model
     for entry in entries:
@@ -109,16 +138,35 @@ def _promised(entries: Sequence[ModelTerm], base: Baseline, fit: FreeRunFit) -> 
     added = base.prepared.known(base.prepared.outputs.stacked(added), fit.span)
     added = added - base.basis @ (base.basis.T @ added)
     noise = noise_left(fit.residual, len(fit.outputs))
-    white, left = (fit.outputs.whitened(x, noise) for x in (added, fit.residual))
-    found, place = dict[str, float](), 0
+    white, left = fit.outputs.whitened(added, noise), fit.outputs.whitened(fit.residual, noise)
+    columns, place = dict[ModelTerm, Floats](), 0
     for entry in entries:
         own = slice(place, place + len(entry.symbols))
         place += len(entry.symbols)
-        if not np.all(np.isfinite(added[:, own])) or not np.any(added[:, own]):
-            continue
-        if _chance(white[:, own], left, len(fit.keys)) * len(entries) < ALPHA:
-            found[entry.name] = _explained(added[:, own], fit.residual)
-    return found
+        seen = np.all(np.isfinite(added[:, own])) and np.any(added[:, own])
+        if seen and _chance(white[:, own], left, len(fit.keys)) * len(entries) < ALPHA:
+            columns[entry] = added[:, own]
+    return {entry: _explained(columns[entry], fit.residual) for entry in _apart_or_alike(columns, fit.residual)}
+
+
+def _apart_or_alike(columns: Mapping[ModelTerm, Floats], residual: Floats) -> list[ModelTerm]:
+    """Changes without those of both sides where these are alike, and without those of all the motion where not."""
+    kept = list[ModelTerm]()
+    for entry in columns:
+        variation = entry.term.variation
+        group = [
+            other for other in columns
+            if other.place == entry.place and variation is not None and other.term.variation is not None
+            and (other.term.variation.of, other.term.variation.along) == (variation.of, variation.along)
+        ]  # fmt: skip
+        whole = [other for other in group if other.term.variation is not None and not other.term.variation.side]
+        sides = [other for other in group if other not in whole]
+        if whole and sides:
+            together = _explained(np.hstack([columns[other] for other in sides]), residual)
+            alike = _explained(columns[whole[0]], residual) >= NEARLY * together
+            group = whole if alike else sides
+        kept += [entry] if entry in group else []
+    return kept
 
 
 def _explained(columns: Floats, residual: Floats) -> float:
@@ -133,15 +181,7 @@ def _chance(columns: Floats, residual: Floats, keys: int) -> float:
     scaled = columns / length_or_one(columns)
     share = _explained(scaled, residual)
     freedom = max(len(residual) - count - keys, 1)
-    return float(fdtrc(count, freedom, share / count / max((1.0 - share) / freedom, np.finfo(float).tiny)))
-
-
-def _best(comparison: Comparison, tried: Sequence[FittedCandidate]) -> float:
-    """The share of what a model leaves on both parts that the best of other effects explains."""
-    left = np.concatenate([comparison.fit.residual, comparison.prediction.residual])
-    power = float(np.mean(left**2))
-    least = min((c.power for c in tried if not c.unphysical), default=power)
-    return 1.0 - least / power if power > 0.0 else 0.0
+    return float(fdtrc(count, freedom, share / count * freedom / max(1.0 - share, 1e-300)))
 
 
 def simplest(tried: Sequence[FittedCandidate]) -> list[FittedCandidate]:
@@ -155,9 +195,18 @@ def simplest(tried: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     found = list[FittedCandidate]()
     for group in groups.values():
         best = min(group, key=lambda c: c.prediction.error)
-        level = [
-            c for c in group
-            if c is best or statistics.worse(c.prediction.residual, best.prediction.residual) < K
-        ]  # fmt: skip
-        found.append(min(level, key=lambda c: (c.unknowns, c.prediction.error)))
+        level = [c for c in group if _level(c, best) and not any(_beaten(c, other) for other in group)]
+        found.append(min(level, key=lambda c: c.unknowns))
     return found
+
+
+def _beaten(one: FittedCandidate, other: FittedCandidate) -> bool:
+    """Whether another with no more unknowns leaves less."""
+    return other.unknowns <= one.unknowns and other.prediction.error < one.prediction.error
+
+
+def _level(one: FittedCandidate, best: FittedCandidate) -> bool:
+    """Whether a candidate leaves no more than the best, but for chance and the numbers' own error."""
+    left, least = one.prediction.residual, best.prediction.residual
+    apart = float(np.sqrt(np.mean((left - least) ** 2)))
+    return apart <= np.hypot(one.numerical, best.numerical) or statistics.worse(left, least) < K

@@ -96,14 +96,17 @@ def diagnose(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
-    tried = candidates.try_all(entries, base, progress)
-    suspect = varying_candidates.suspected(comparison, tried)
-    if suspect is not None:  # what changes along a record is asked for where both parts see all of it
-        if suspect.comparison is not comparison:
+    tried, promise = list[FittedCandidate](), varying_candidates.promise(comparison)
+    if promise is None or not promise.alone:
+        tried = candidates.try_all(entries, base, progress)
+    if promise is not None and (promise.alone or promise.beside(tried)) and (suspect := promise.suspect()):
+        if suspect.comparison is not comparison or not tried:
             comparison, base = suspect.comparison, search_base(suspect.comparison)
             tried = candidates.try_all(entries, base, progress)
         tried += varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
         entries += suspect.entries
+    elif not tried:
+        tried = candidates.try_all(entries, base, progress)
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
     decision = _decide(rows, tried, base, comparison, asked, progress)

@@ -7,6 +7,7 @@ them brings to a minimum is begun anew from multiple shooting, within whose segm
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from study.equations.model import Model, ModelTerm
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
+from study.identify.frequency_domain.start_of_changes import start_of_changes
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -235,6 +237,10 @@ def _from_the_free_run(entry: ModelTerm, base: Baseline, points: Sequence[Start]
         grown = fit.model.with_term(entry)
         anew = _reversed(grown.with_values(starts[0]), base.prepared) or base.linear
         starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.symbols)})
+        if entry.term.variation is not None:
+            with suppress(StudyError):
+                along = start_of_changes(grown.with_values(starts[0]), base.prepared)
+                starts.append(starts[0] | {k: v for k, v in along.items() if k in (*fit.keys, *entry.symbols)})
     return starts
 
 
