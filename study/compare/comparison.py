@@ -20,6 +20,7 @@ from study.compare.local_force_error import local_force_error
 from study.compare.minima import rivals_note
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
 from study.compare.prediction import Prediction, SensorPrediction, predict
+from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import Modes, is_positive, modes_of
 from study.equations.model import Model
@@ -95,6 +96,12 @@ class Comparison:
     def coefficients(self) -> tuple[Coefficient, ...]:
         """Every value with its interval and unit."""
         return coefficients(self.fit.model, self.found, self.record)
+
+    @cached_property
+    def varying(self) -> tuple[VaryingCoefficient, ...]:
+        """Coefficients that vary along time or with a channel, with their bands."""
+        count = len(self.fit.keys)
+        return varying_coefficients(self.fit, self.found.covariance[:count, :count], self.prepared)
 
     @cached_property
     def modes(self) -> Modes:

@@ -16,6 +16,7 @@ from study.compare.decay import decays_of
 from study.compare.force_map import curve, surface
 from study.compare.loops import loops
 from study.compare.place_pictures import place_figures, responses_figure
+from study.compare.varying_coefficients import varying_figure
 from study.equations.place import place_in_words
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
@@ -35,6 +36,7 @@ def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
             **({"force_error": force_error_figure(comparison)} if comparison.forces else {}),
             "missing_force": missing_force_figure(comparison), "error_in_time": error_in_time_figure(comparison),
             **(place_figures if comparison.model.named else _of_its_kind)(comparison),
+            **({"varying": varying_figure(comparison.varying, comparison.record.name)} if comparison.varying else {}),
         }  # fmt: skip
         return page.image_files(drawn)
 

@@ -18,6 +18,7 @@ from study.compare.decay import decays_of
 from study.compare.dependence import explained_by_place
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
+from study.compare.varying_coefficients import varying_fields
 from study.equations import model_file
 from study.equations.linear_part import Modes, modes_table
 from study.equations.place import HERE
@@ -70,6 +71,7 @@ def _of_record(comparison: Comparison) -> Row:
         "rms": {}, "above_noise": {"response": prediction.above_noise},
         "coefficients": [coefficient_row(c) for c in comparison.coefficients],
         **({"by_frequency": [_line_row(s) for s in comparison.by_line]} if model.modal else {}),
+        **({"varying": [varying_fields(one) for one in comparison.varying]} if comparison.varying else {}),
         "fit": {
             "samples": list(comparison.spans[0]), "judged": list(comparison.spans[1]),
             "every_sample": comparison.prepared.every, "response": comparison.plan.response,

@@ -9,6 +9,7 @@ from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
+from study.compare.varying_coefficients import varying_in_words
 from study.equations.place import place_in_words
 from study.support.numbers import by_chance, percent
 
@@ -36,6 +37,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
         sentences.append(_where(comparison))
     if comparison.model.named:
         sentences += _of_equations(comparison)
+    sentences += [varying_in_words(one).removesuffix(".") for one in comparison.varying]
     if not comparison.fit.converged:
         sentences.append(
             f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from study.compare.comparison_report import as_json, mode_rows, where
+from study.compare.varying_coefficients import varying_fields
 from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
@@ -56,6 +57,8 @@ def diagnosis_files(
             content[of]["sensors"] = {str(sensor): value for sensor, value in shown}
         after = diagnosis.modes_after
         content["modes"] = {"before": mode_rows(comparison.modes), "after": after and mode_rows(after)}
+    if diagnosis.varying:
+        content["varying"] = [varying_fields(one) for one in diagnosis.varying]
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = needless_fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})

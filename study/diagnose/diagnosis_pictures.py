@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from study.compare.place_pictures import modes, sketch_of, structure_figure
+from study.compare.varying_coefficients import varying_figure
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
@@ -29,6 +30,8 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
     comparison = diagnosis.comparison
     with in_style():
         drawn = diagnosis_figures(diagnosis, record) if diagnosis.candidates or not comparison.model.named else {}
+        if diagnosis.varying:
+            drawn["varying"] = varying_figure(diagnosis.varying, record)
         if comparison.model.named:
             sets = [("as given", comparison.modes)]
             sets += [("with what is missing", diagnosis.modes_after)] if diagnosis.modes_after is not None else []

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from study.compare.varying_coefficients import varying_in_words
 from study.diagnose import verdict
 from study.diagnose.constancy import wavers
 from study.diagnose.held_out import evidence, held_out_of
@@ -30,6 +31,8 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
             said = _several(diagnosis, diagnosis.sets[0])
         case _:
             said = _unknown(diagnosis)
+    if diagnosis.answer is not None:
+        said += [varying_in_words(one) for one in diagnosis.varying]
     if diagnosis.comparison.prediction.diverged:
         said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
     return said
@@ -72,10 +75,12 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     words, where = term_names(first.term.name), first.entry.place
     placed = f" {place_in_words(where)}" if where.label else ""
     said = [
-        f"{words[0].upper()}{words[1:]} is missing{placed} ({first.term.meaning}).",
+        f"{words[0].upper()}{words[1:]} is missing{placed} ({first.term.meaning})."
+        if first.term.variation is None
+        else f"The model lacks {first.term.meaning}{placed}.",
         f"With it the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, first)}; the "
         f"noise floor is {percent(first.prediction.floor)}.",
-        f"Its coefficient is {_amount(first.effect)}.",
+        f"{_its_coefficient(first.entry)} {_amount(first.effect)}.",
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
@@ -85,6 +90,10 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
+
+
+def _its_coefficient(entry: ModelTerm) -> str:
+    return "Its coefficient is" if entry.term.variation is None else "The largest change is"
 
 
 def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:

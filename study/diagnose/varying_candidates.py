@@ -181,7 +181,8 @@ def _chance(columns: Floats, residual: Floats, keys: int) -> float:
     scaled = columns / length_or_one(columns)
     share = _explained(scaled, residual)
     freedom = max(len(residual) - count - keys, 1)
-    return float(fdtrc(count, freedom, share / count * freedom / max(1.0 - share, 1e-300)))
+    ratio = share / count * freedom / max(1.0 - share, 1e-300)
+    return float(np.asarray(fdtrc(count, freedom, ratio), dtype=np.float64))
 
 
 def simplest(tried: Sequence[FittedCandidate]) -> list[FittedCandidate]:

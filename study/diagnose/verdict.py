@@ -11,6 +11,7 @@ from study.compare import dependence
 from study.compare.comparison import Comparison
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
+from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.diagnose import candidates, varying_candidates
 from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
 from study.diagnose.credibility import credible
@@ -71,6 +72,15 @@ class Diagnosis:
             name: tuple(sorted(next(iter(names - own)) for names in others if own - names == {name}))
             for name in (() if self.answer is None else self.answer.names)
         }
+
+    @cached_property
+    def varying(self) -> tuple[VaryingCoefficient, ...]:
+        """Coefficients that vary with what is missing, or in the model as given where nothing is named."""
+        if self.answer is None:
+            return self.comparison.varying
+        fit, prepared, count = self.answer.fit, self.comparison.prepared, len(self.answer.fit.keys)
+        covariance = uncertainty(fit, prepared, linearise(fit, prepared))
+        return varying_coefficients(fit, covariance[:count, :count], prepared)
 
     @cached_property
     def modes_after(self) -> Modes | None:

@@ -28,7 +28,8 @@ Times = tuple[float, float | None]  # seconds
 
 def term(
     name: str, *, force: str | None = None, at: str | None = None, between: Sequence[str] | None = None,
-    couples: Sequence[str] | None = None, **values: float,
+    couples: Sequence[str] | None = None, varies_with: str | None = None, shape: str = "curve", only: str = "",
+    knots: Sequence[float] = (), changes: Sequence[float] | float | None = None, **values: float,
 ) -> "Term":  # fmt: skip
     """A term with values that a fit holds.
 
@@ -41,6 +42,16 @@ def term(
     at, between, couples : str or pair of str, optional
         Of a structure: the coordinate on which it acts, the two between which it does (``ground`` may be one of them),
         or the two that an inertia couples.
+    varies_with : str, optional
+        ``"time"`` or a channel of the record: the term is then what the coefficients of that effect change by, beside
+        the term itself.
+    shape : str
+        How they change: ``"curve"``, ``"line"`` or ``"step"``.
+    only : str
+        The side of the motion that has the change, such as ``"v > 0"``; all of it if left out.
+    knots, changes : sequence of float
+        Where the changes are given, and by how much the coefficient differs there, zero at the first; fitted if left
+        out.
     **values : float
         ``value`` of its coefficient (``amplitude`` and ``phase`` of a periodic one) and shape parameters by name, in
         the units of the record. What is left out is fitted.
@@ -54,8 +65,17 @@ def term(
     --------
     >>> term("cubic_stiffness", value=2e7)
     <Term cubic_stiffness: u**3; k3 = 2e+07>
+    >>> term("linear_stiffness", varies_with="time", shape="line", knots=[0.0, 60.0], changes=[0.0, -35.0])
+    <Term linear_stiffness_over_time: (u) that changes evenly along time; k_time = -35>
     """
     given: dict[object, object] = {"term": name, **({} if force is None else {"force": force}), **values}
+    if varies_with is not None:
+        given |= {"varies_with": varies_with, "shape": shape} | ({"only": only} if only else {})
+        given |= {"knots": [float(x) for x in knots]} if len(knots) else {}
+        if changes is not None:
+            given["changes"] = changes if isinstance(changes, int | float) else [float(x) for x in changes]
+    else:
+        expect(not (only or len(knots) or changes is not None), f"{name} has a change and no varies_with")
     return Term.of(replace(model_file.entry_from(given), place=_place(name, at, between, couples)))
 
 

@@ -121,6 +121,22 @@ class FitPictures:
             drawn.legend(loc="upper right")
         return drawn
 
+    def plot_varying(self, coefficient: str | None = None, ax: "Axes | None" = None) -> "Axes":
+        """A coefficient that varies along time or its channel with its 95 % band: by its name, or the first."""
+        from study.compare.varying_coefficients import varying_panel
+        from study.support.errors import expect
+
+        found = {one.symbol: one for one in self.comparison.varying}
+        known = ", ".join(found) or "none: the model has no entry with varies_with"
+        there = bool(found) if coefficient is None else coefficient in found
+        expect(there, f"no {coefficient or 'coefficient'} varies in this model; expected one of {known}")
+        one = found[coefficient or next(iter(found))]
+        with drawing_axes(ax) as (axes,):
+            varying_panel(axes, one)
+            axes.legend(loc="best")
+            axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}")
+        return axes
+
     def _seen(self, sensor: str | None) -> "SensorPrediction":
         from study.support.errors import expect
 

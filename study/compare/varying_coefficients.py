@@ -1,0 +1,144 @@
+"""Coefficients that vary, as fitted: each along time or a channel with its 95 % band, its knots and its unknowns."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from study.equations import dimensions
+from study.equations.coefficient_units import coefficient_unit
+from study.equations.model import ModelTerm
+from study.equations.variation import ALONG_TIME, STEP_AT
+from study.figures import page
+from study.figures.labels import term_names
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.smoothness import smoothness
+from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.numbers import percent
+
+
+@dataclass(frozen=True, eq=False)
+class VaryingCoefficient:
+    """One coefficient along what it varies with; arrays of shape (n,)."""
+
+    entry: ModelTerm  # the term of its change
+    symbol: str  # of the coefficient that changes
+    along: str  # ``time``, or the name of a channel
+    along_unit: str
+    at: Floats  # values of that, over all that the record covers
+    value: Floats  # the coefficient there
+    error: Floats  # its standard error
+    unit: str
+    knots: tuple[float, ...]  # none of a step
+    unknowns: float  # that its change effectively takes
+    step: tuple[float, float] | None  # where it steps, and the standard error of that; None of a curve or a line
+
+    @property
+    def change(self) -> float:
+        """From its smallest to its largest value, over the mean."""
+        return float(np.ptp(self.value) / abs(np.mean(self.value)))
+
+
+def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared) -> tuple[VaryingCoefficient, ...]:
+    """Every coefficient of a fitted model that varies; ``covariance`` is of its keys, shape (keys, keys)."""
+    values, place = fit.model.numbers(), {key: i for i, key in enumerate(fit.keys)}
+    taken = {one.entry.name: one.unknowns for one in smoothness(fit, prepared)}
+    found = list[VaryingCoefficient]()
+    for entry in fit.model.terms:
+        variation = entry.term.variation
+        if variation is None:
+            continue
+        along = variation.values(prepared.record)
+        at = np.linspace(float(np.min(along)), float(np.max(along)), 201)
+        moment = f"{entry.name}.{STEP_AT}"
+        basis = variation.basis(at, values.get(moment, 0.0))
+        each = basis.shape[1]
+        unit = prepared.record.unit(variation.along) if variation.along != ALONG_TIME else "s"
+        for i, symbol in enumerate(variation.of.symbols):
+            key = symbol + entry.place.suffix
+            own = (key, *entry.symbols[i * each : (i + 1) * each])
+            rows = np.hstack([np.ones((len(at), 1)), basis])
+            fitted = [j for j, name in enumerate(own) if name in place]
+            block = covariance[np.ix_([place[own[j]] for j in fitted], [place[own[j]] for j in fitted])]
+            spread = np.einsum("ij,jk,ik->i", rows[:, fitted], block, rows[:, fitted])
+            step = None
+            if variation.shape == "step":
+                known = place.get(moment)
+                step = values[moment], 0.0 if known is None else float(np.sqrt(max(covariance[known, known], 0.0)))
+            found.append(
+                VaryingCoefficient(
+                    entry, key, variation.along, unit, at, rows @ np.array([values[name] for name in own]),
+                    np.sqrt(np.maximum(spread, 0.0)), coefficient_unit(replace(entry, term=variation.of), symbol,
+                    prepared.record), variation.knots, taken.get(entry.name, float(len(entry.keys))), step,
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+def varying_in_words(one: VaryingCoefficient) -> str:
+    """What a coefficient does along what it varies with, in a sentence."""
+    variation = one.entry.term.variation
+    name = term_names(variation.of.name) if variation else one.symbol
+    side = f" where {variation.side}" if variation and variation.side else ""
+    first, last = (f"{one.value[i]:.4g} +- {1.96 * one.error[i]:.2g}" for i in (0, -1))
+    if one.step is not None:
+        moment, error = one.step
+        where = f"{one.along} {moment:.4g} +- {1.96 * error:.2g} {one.along_unit}".rstrip()
+        return f"The {name} ({one.symbol}) steps{side} from {first} to {last} {one.unit} at {where}."
+    a, b = sorted((int(np.argmin(one.value)), int(np.argmax(one.value))))
+    ends = [f"{one.value[i]:.4g} +- {1.96 * one.error[i]:.2g} {one.unit} at {one.at[i]:.4g}" for i in (a, b)]
+    along = f"{one.along.replace('_', ' ')}{f' ({one.along_unit})' if one.along_unit else ''}"
+    return (
+        f"The {name} ({one.symbol}) varies with {along}{side}, by {percent(one.change)} of its mean: from {ends[0]} to "
+        f"{ends[1]}, seen from {one.at[0]:.4g} to {one.at[-1]:.4g}; the curve takes {one.unknowns:.1f} unknowns."
+    )
+
+
+def varying_fields(one: VaryingCoefficient) -> dict[str, object]:
+    """The same for a file."""
+    step = {} if one.step is None else {"step_at": one.step[0], "step_at_error": one.step[1]}
+    return {
+        "coefficient": one.symbol, "varies_with": one.along, "unit": one.unit, "along_unit": one.along_unit,
+        "at": one.at[::10].tolist(), "value": one.value[::10].tolist(), "error": one.error[::10].tolist(),
+        "knots": list(one.knots), "unknowns": one.unknowns, **step,
+    }  # fmt: skip
+
+
+def varying_panel(axes: Axes, one: VaryingCoefficient) -> Axes:
+    """The coefficient along what it varies with, its band of 95 %, and its knots."""
+    half = 1.96 * one.error
+    axes.fill_between(one.at, one.value - half, one.value + half, color="0.8", linewidth=0.0, label="95 % band")
+    axes.plot(one.at, one.value, color="C0", linewidth=1.6, label="coefficient")
+    if one.knots:
+        inside = [k for k in one.knots if one.at[0] <= k <= one.at[-1]]
+        heights = np.interp(inside, one.at, one.value)
+        axes.plot(
+            inside, heights, linestyle="none", marker="o", markersize=4.0, color="C0", label="knots", clip_on=False
+        )
+    axes.set_xlim(float(one.at[0]), float(one.at[-1]))
+    axes.set_xlabel(one.along.replace("_", " ") + (f" ({dimensions.pretty(one.along_unit)})" if one.along_unit else ""))
+    axes.set_ylabel(f"{one.symbol} ({dimensions.pretty(one.unit)})")
+    return axes
+
+
+def varying_figure(found: Sequence[VaryingCoefficient], record: str) -> Figure:
+    """All coefficients that vary, one below the other."""
+    figure, axes = page.empty_page(
+        f"{record}: coefficients that vary", "with bands of 95 %, over what the record covers", rows=len(found),
+        width=7.2, panel=2.3, share=False,
+    )  # fmt: skip
+    for panel, one in zip(axes, found, strict=True):
+        varying_panel(panel, one)
+    words = [
+        f"{term_names(one.entry.term.variation.of.name)}, {one.unknowns:.1f} unknowns"
+        for one in found if one.entry.term.variation
+    ]  # fmt: skip
+    page.letter(axes, tuple(words))
+    page.shared_legend(figure, axes)
+    return figure
