@@ -70,7 +70,9 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
             step = None
             if variation.shape == "step":
                 known = place.get(moment)
-                step = values[moment], 0.0 if known is None else float(np.sqrt(max(covariance[known, known], 0.0)))
+                own_error = 0.0 if known is None else max(float(covariance[known, known]), 0.0)
+                # how long it takes is assumed: what steps at once may do so anywhere within
+                step = values[moment], float(np.sqrt(own_error + (variation.lasts or 0.0) ** 2 / 12.0))
             found.append(
                 VaryingCoefficient(
                     entry, key, variation.along, unit, at, rows @ np.array([values[name] for name in own]),

@@ -35,6 +35,8 @@ def added(comparison: Comparison, term: Term | ModelTerm) -> Comparison:
 def added_candidate(comparison: Comparison, candidate: Ranked) -> Comparison:
     """The comparison of the model with an effect or a set of its diagnosis, begun where the fit of that ended."""
     prepared, model = comparison.prepared, comparison.model
+    if any(entry.term.variation for entry in candidate.entries):  # asked for where both parts see all of the record
+        prepared = candidate.prediction.prepared
     for entry in candidate.entries:
         model = model.with_term(entry)
     return running_on(compare(model, prepared, fit=finished(candidate.fit, prepared)))

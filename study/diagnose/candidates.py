@@ -12,12 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from study.compare.prediction import Prediction, predict
-from study.equations.model import ModelTerm
+from study.equations.model import ModelTerm, free
 from study.equations.term import Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_range import idle_effects
 from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
+from study.identify.time_domain.smoothness import refined
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
@@ -62,8 +63,13 @@ class FittedCandidate:
 
     @property
     def unknowns(self) -> int:
-        """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is."""
-        return sum(len(e.term.components) + len(e.term.parameters) for e in self.entries)
+        """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is.
+
+        A curve counts as the four that it is searched with: its smoothness leaves it little more.
+        """
+        counts = [len(e.term.components) if e.term.variation is None else min(len(e.term.components), 4)
+                  for e in self.entries]  # fmt: skip
+        return sum(counts) + sum(len(e.term.parameters) for e in self.entries)
 
     @property
     def flexible(self) -> bool:
@@ -221,9 +227,17 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
 
     def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
-            fit = finished(candidate.fit, prepared)
-            return judged_candidate(candidate.entries, fit, prepared) or candidate
+            fit = finished(refined(candidate.fit, prepared), prepared)
+            entries = tuple(_as_in(entry, fit) for entry in candidate.entries)
+            return judged_candidate(entries, fit, prepared) or candidate
         except StudyError:
             return candidate
 
     return list(side_by_side(settle, candidates, lambda candidate: candidate.term.effort))
+
+
+def _as_in(entry: ModelTerm, fit: FreeRunFit) -> ModelTerm:
+    """An effect as it is asked for, with the knots that it has in a fit."""
+    if entry.term.variation is None:
+        return entry
+    return free(next(e.term for e in fit.model.terms if e.name == entry.name), entry.place)

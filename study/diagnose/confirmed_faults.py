@@ -10,7 +10,7 @@ from study.diagnose.varying_candidates import promise
 from study.diagnose.verdict import Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
-from study.faults.fault import GAIN_CHANGE, Fault
+from study.faults.fault import Fault
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
 
@@ -59,24 +59,27 @@ def diagnose_accounted(
 
 
 def _changing_instead(first: Diagnosed, found: Callable[[Accounted], Diagnosed]) -> Diagnosed | None:
-    """The diagnosis where a coefficient changes along the record, not the gain of a sensor; None if it is no better.
+    """The diagnosis where a coefficient changes, not an instrument; None if it is no better, or nothing may change.
 
-    Either makes the response grow or fall along the record: the one that leaves less stands.
+    What changes along a record makes the response grow or fall like a changing gain, and turns its phase like a delay:
+    the one that leaves less stands. What faults there are beside the change is asked for again.
     """
-    others = [f for f in first.accounted.faults if f.fault != GAIN_CHANGE or f.held or not f.corrected]
+    others = [f for f in first.accounted.faults if f.held or not f.corrected]
     if len(others) == len(first.accounted.faults):
         return None
     try:
         accounted = first.accounted.corrected_for(others)
-        if promise(accounted.comparison) is None:
+        changes = promise(accounted.comparison)
+        if changes is None or not changes.alone:
             return None
         again = found(accounted)
     except StudyError:
         return None
     before, answer = first.diagnosis, again.diagnosis.answer
     least = before.comparison.prediction.error if before.answer is None else before.answer.response_error
-    changes = answer is not None and any(entry.term.variation for entry in answer.entries)
-    return again if changes and answer is not None and answer.response_error < least else None
+    if answer is None or not any(entry.term.variation for entry in answer.entries):
+        return None
+    return again if answer.response_error < least else None
 
 
 def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:

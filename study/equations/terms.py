@@ -271,6 +271,11 @@ def effects_but(known: Container[str], extra: Iterable[Term] = ()) -> list[Term]
     return [t for t in (*LIBRARY.values(), *extra) if t.name not in known and t.name != "inertia"]
 
 
+def is_own(term: Term) -> bool:
+    """Whether it is one that the user brings, and no effect of the library or change of one."""
+    return term.name not in LIBRARY and term.variation is None
+
+
 def find_terms(word: str) -> tuple[Term, ...]:
     """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause."""
     sought = word.strip().lower().replace(" ", "_")

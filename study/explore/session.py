@@ -25,7 +25,7 @@ from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
 from study.equations import formulas
 from study.equations.model import Model, free
-from study.equations.terms import LIBRARY, Term, custom
+from study.equations.terms import Term, custom, is_own
 from study.explore.by_record import ByRecord, Several, by_record
 from study.records.prepared import Prepared
 from study.records.record_layout import records_judged
@@ -59,7 +59,7 @@ class Stage:
         """What a page lists: sets of effects, the best single ones, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
         sets = [r for r in self.diagnosis.sets if len(r.entries) > 1] if self.diagnosis is not None else []
-        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if r.term.name not in LIBRARY))
+        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if is_own(r.term)))
 
     @property
     def values(self) -> dict[str, float]:
@@ -222,6 +222,10 @@ def examined(session: Session, progress: Progress | None = None) -> tuple[Stage,
 
 def with_diagnosis(stage: Stage, diagnosis: Diagnosis) -> Stage:
     """A stage whose terms were weighed with its diagnosis, in words too, and what each candidate would leave."""
+    if diagnosis.comparison.prepared.plan != stage.comparison.prepared.plan:  # laid out anew, as changes ask for
+        stage = replace(
+            stage_of(diagnosis.comparison, stage.label, stage.added, stage.dropped), unneeded=stage.unneeded
+        )
     said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(stage.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(stage, diagnosis=diagnosis, said=said))
 

@@ -14,9 +14,10 @@ from study.equations.coefficient_units import coefficient_unit
 from study.equations.linear_part import connections
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
-from study.equations.terms import LIBRARY
+from study.equations.terms import is_own
 from study.explore.page_units import Scale, in_percent, in_sentence, in_text, mass, motion, number, with_error
 from study.explore.session import Stage
+from study.explore.varying_drawing import varying_drawing
 from study.figures.labels import power_of_ten, term_names
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
@@ -145,7 +146,7 @@ def gives(row: Ranked) -> bool:
 
 def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
     """Whether a candidate is offered: the user's own, and one of what is missing that explains more than chance."""
-    return row.term.name not in LIBRARY or (diagnosis.verdict != NOTHING and gives(row))
+    return is_own(row.term) or (diagnosis.verdict != NOTHING and gives(row))
 
 
 def _row(number: int, row: Ranked, rank: str, stage: Stage, live: bool) -> str:
@@ -189,7 +190,7 @@ def _detail(row: Ranked) -> str:
     said += f"{'it' if len(effects) == 1 else 'them'} {in_percent(row.response_error)}."
     if len(effects) == 1:
         said += f" {escape(row.term.meaning[0].upper() + row.term.meaning[1:])}."
-        said += f" Found in {escape(row.term.cause)}." if row.term.name in LIBRARY else ""
+        said += f" Found in {escape(row.term.cause)}." if not is_own(row.term) else ""
     elif 0.0 < row.distance < math.inf:
         said += f" That leaves more than the first by {number(row.distance, 2)} standard errors."
     who = "it" if len(effects) == 1 else "one of them"
@@ -235,7 +236,8 @@ def _coefficients(stage: Stage, live: bool) -> str:
     unneeded = {n.entry.keys[0]: n for n in stage.unneeded or ()}
     rows = [_coefficient(c, live, unneeded.get(c.key)) for c in stage.comparison.coefficients]
     modal = "" if stage.model.named else _modal(stage.comparison)  # the modes of a structure are a table of their own
-    return f"<table>{head}{''.join(rows)}{modal}</table>"
+    drawn = "".join(varying_drawing(one) for one in stage.comparison.varying)
+    return f"<table>{head}{''.join(rows)}{modal}</table>{drawn}"
 
 
 def _modal(comparison: Comparison) -> str:

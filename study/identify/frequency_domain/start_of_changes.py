@@ -7,7 +7,8 @@ again. The equation of motion is linear in all coefficients and their changes, a
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from study.equations.model import Model
+from study.equations.model import Model, ModelTerm
+from study.equations.variation import STEP_AT
 from study.identify.frequency_domain.inputs import INERTIA, Input, input_history, reverse_inputs
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -16,8 +17,23 @@ from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
 
-def start_of_changes(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Coefficients of a single mass by least squares along each run of the fitting part; shape parameters are known.
+def start_of_changes(model: Model, entry: ModelTerm, prepared: Prepared) -> dict[str, float]:
+    """Coefficients by :func:`along_the_equation`, and of a step the moment that leaves least, of those it may have."""
+    variation = entry.term.variation
+    if variation is None or variation.shape != "step" or None not in entry.parameters:
+        return along_the_equation(model, prepared)[0]
+    moment = next(key for key in entry.keys if key.endswith(f".{STEP_AT}"))
+    places = next(p.search.places for p in entry.term.parameters if p.name == STEP_AT)
+    tried = np.quantile(variation.values(prepared.record)[slice(*prepared.plan.fit)], places)
+    found = [(along_the_equation(model.with_values({moment: float(at)}), prepared), float(at)) for at in tried]
+    (best, _), at = min(found, key=lambda one: one[0][1])
+    return best | {moment: at}
+
+
+def along_the_equation(model: Model, prepared: Prepared) -> tuple[dict[str, float], float]:
+    """Coefficients of a single mass by least squares along each run of the fitting part, and what they leave.
+
+    Shape parameters are known.
 
     Both sides of the equation pass a low-pass filter like the receptance, under a taper, so that noise on a derivative
     weighs as it does in a response. Of free motions they are per unit of the mass that the model gives.
@@ -40,10 +56,12 @@ def start_of_changes(model: Model, prepared: Prepared) -> dict[str, float]:
         columns = [_force(item, k, run) for item in inputs for k, p in enumerate(item.parts) if p.symbol in symbols]
         rows.append(np.column_stack([_weighed(column, run.dt, rate) for column in columns]))
         targets.append(_weighed(acting, run.dt, rate))
-    found = least_squares(np.concatenate(rows), np.concatenate(targets), 1e-9)
+    design, target = np.concatenate(rows), np.concatenate(targets)
+    found = least_squares(design, target, 1e-9)
     if not np.all(np.isfinite(found)):
         raise StudyError(f"the equation of {model.name!r} along {part.name!r} has no solution")
-    return dict(zip(symbols, found.tolist(), strict=True)) | ({"m": mass} if prepared.free else {})
+    left = float(np.sum((target - design @ found) ** 2))
+    return dict(zip(symbols, found.tolist(), strict=True)) | ({"m": mass} if prepared.free else {}), left
 
 
 def _force(item: Input, number: int, run: Record) -> Floats:

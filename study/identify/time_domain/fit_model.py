@@ -239,8 +239,8 @@ def _from_the_free_run(entry: ModelTerm, base: Baseline, points: Sequence[Start]
         starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.symbols)})
         if entry.term.variation is not None:
             with suppress(StudyError):
-                along = start_of_changes(grown.with_values(starts[0]), base.prepared)
-                starts.append(starts[0] | {k: v for k, v in along.items() if k in (*fit.keys, *entry.symbols)})
+                along = start_of_changes(grown.with_values(starts[0]), entry, base.prepared)
+                starts.append(starts[0] | {k: v for k, v in along.items() if k in (*fit.keys, *entry.keys)})
     return starts
 
 

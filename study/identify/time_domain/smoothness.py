@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.equations.model import ModelTerm
-from study.equations.variation import roughness
+from study.equations.laid_variations import laid_entry
+from study.equations.model import ModelTerm, free
+from study.equations.variation import roughness, varying
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.records.prepared import Prepared
@@ -48,6 +49,33 @@ def smoothed(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         if np.all(np.abs(weights - before) <= 0.05 * weights):
             break
     return fit
+
+
+def refined(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit with curves of as many knots as a model that leaves these open has, where a search took fewer."""
+    model, start = fit.model, dict(fit.model.numbers())
+    for entry in fit.model.terms:
+        variation = entry.term.variation
+        if variation is None or len(variation.knots) < 3 or not set(entry.symbols) <= set(fit.keys):
+            continue
+        finer = laid_entry(free(varying(replace(variation, knots=())), entry.place), prepared)
+        new = finer.term.variation
+        if new is None or len(new.knots) <= len(variation.knots):
+            continue
+        curve = variation.basis(np.array(new.knots[1:])) @ np.array([start[symbol] for symbol in entry.symbols])
+        start |= dict(zip(finer.symbols, curve.tolist(), strict=True))
+        model = replace(model, terms=tuple(finer if e is entry else e for e in model.terms))
+    if model is fit.model:
+        return fit
+    held, values = [k for k in fit.held if k in model.values], {k: v for k, v in start.items() if k in model.values}
+    try:
+        again = fit_part(
+            model.with_values(values), prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial)
+            if fit.span == prepared.plan.fit else None,
+        )  # fmt: skip
+    except StudyError:
+        return fit
+    return replace(again, elsewhere=fit.elsewhere)
 
 
 def smoothness(fit: FreeRunFit, prepared: Prepared) -> tuple[Smoothness, ...]:
