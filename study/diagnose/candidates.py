@@ -63,13 +63,8 @@ class FittedCandidate:
 
     @property
     def unknowns(self) -> int:
-        """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is.
-
-        A curve counts as the four that it is searched with: its smoothness leaves it little more.
-        """
-        counts = [len(e.term.components) if e.term.variation is None else min(len(e.term.components), 4)
-                  for e in self.entries]  # fmt: skip
-        return sum(counts) + sum(len(e.term.parameters) for e in self.entries)
+        """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is."""
+        return sum(map(unknowns_of, self.entries))
 
     @property
     def flexible(self) -> bool:
@@ -95,6 +90,15 @@ class FittedCandidate:
         values = self.fit.model.values
         broken = next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
         return broken or idle_effects(self.fit, self.entries, self.prediction.prepared)
+
+
+def unknowns_of(entry: ModelTerm) -> int:
+    """Coefficients and shape parameters of one effect; more than one of a flexible one.
+
+    A curve counts as the four that it is searched with: its smoothness leaves it little more.
+    """
+    most = len(entry.term.components) if entry.term.variation is None else 4
+    return min(len(entry.term.components), most) + len(entry.term.parameters)
 
 
 def _own(entry: ModelTerm, values: Mapping[str, float | None]) -> dict[str, float | None]:

@@ -1,13 +1,13 @@
 """Faults of the measurement in the light of a diagnosis."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
 from study.diagnose.varying_candidates import promise
-from study.diagnose.verdict import Diagnosis
+from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import Fault
@@ -31,7 +31,9 @@ def diagnose_accounted(
 
     What a model lacks hides faults and imitates others. So where a set of effects is found, or something is left beside
     what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
-    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Arguments as for
+    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Where nothing is found in
+    a corrected record, what was corrected may have been the motion that is missing: then the record is diagnosed
+    without what the model alone told of its faults. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
 
@@ -40,46 +42,51 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
-    first = _changing_instead(first, found) or first
-    accounted, answer = first.accounted, first.diagnosis.answer
-    if answer is None or (first.diagnosis.left <= TOLERANCE and not (accounted.faults and len(answer.entries) > 1)):
+    first = found(accounted)
+    if any(f.corrected and not _plain(f) for f in accounted.faults):
+        uncorrected = accounted.corrected_for([f for f in accounted.faults if _plain(f)])
+        if first.diagnosis.verdict == UNKNOWN or _may_change(uncorrected):
+            first = _instead(first, found(uncorrected))
+    answer, faults = first.diagnosis.answer, first.accounted.faults
+    beside = len(faults) > 0 or first.accounted is not accounted
+    if answer is None or (first.diagnosis.left <= TOLERANCE and not (beside and len(answer.entries) > 1)):
         return first
     model = accounted.comparison.model
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
-        faults = accounted.faults_beside(answer.fit, model)
-        if same(faults, accounted.faults):
+        shown = accounted.faults_beside(answer.fit, model)
+        if same(shown, faults):
             return first
-        again = found(accounted.corrected_for(faults))
+        again = found(accounted.corrected_for(shown))
     except StudyError:
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
 
 
-def _changing_instead(first: Diagnosed, found: Callable[[Accounted], Diagnosed]) -> Diagnosed | None:
-    """The diagnosis where a coefficient changes, not an instrument; None if it is no better, or nothing may change.
+def _may_change(accounted: Accounted) -> bool:
+    """Whether a coefficient may change along the record, which scales and turns the response as an instrument does."""
+    changes = promise(accounted.comparison)
+    return changes is not None and changes.alone
 
-    What changes along a record makes the response grow or fall like a changing gain, and turns its phase like a delay:
-    the one that leaves less stands. What faults there are beside the change is asked for again.
+
+def _instead(first: Diagnosed, other: Diagnosed) -> Diagnosed:
+    """The diagnosis of a corrected record, or that without the corrections where it finds more.
+
+    Where both name something, the other names a change, and leaves less.
     """
-    others = [f for f in first.accounted.faults if f.held or not f.corrected]
-    if len(others) == len(first.accounted.faults):
-        return None
-    try:
-        accounted = first.accounted.corrected_for(others)
-        changes = promise(accounted.comparison)
-        if changes is None or not changes.alone:
-            return None
-        again = found(accounted)
-    except StudyError:
-        return None
-    before, answer = first.diagnosis, again.diagnosis.answer
+    before, answer = first.diagnosis, other.diagnosis.answer
+    if answer is None or before.verdict == UNKNOWN:
+        return first if answer is None else other
     least = before.comparison.prediction.error if before.answer is None else before.answer.response_error
-    if answer is None or not any(entry.term.variation for entry in answer.entries):
-        return None
-    return again if answer.response_error < least else None
+    changes = any(entry.term.variation for entry in answer.entries)
+    return other if changes and answer.response_error < least else first
+
+
+def _plain(fault: Fault) -> bool:
+    """Whether a fault shows in the record itself, or is known, whatever model is held beside it."""
+    return fault.held or fault.lost is not None
 
 
 def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:
