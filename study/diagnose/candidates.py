@@ -18,7 +18,7 @@ from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_range import idle_effects
 from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
-from study.identify.time_domain.smoothness import refined
+from study.identify.time_domain.smoothness import with_all_knots
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
@@ -231,7 +231,7 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
 
     def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
-            fit = finished(refined(candidate.fit, prepared), prepared)
+            fit = finished(with_all_knots(candidate.fit, prepared), prepared)
             entries = tuple(_as_in(entry, fit) for entry in candidate.entries)
             return judged_candidate(entries, fit, prepared) or candidate
         except StudyError:

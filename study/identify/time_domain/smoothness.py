@@ -51,7 +51,7 @@ def smoothed(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return fit
 
 
-def refined(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+def with_all_knots(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with curves of as many knots as a model that leaves these open has, where a search took fewer."""
     model, start = fit.model, dict(fit.model.numbers())
     for entry in fit.model.terms:
