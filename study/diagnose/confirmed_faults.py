@@ -1,7 +1,7 @@
 """Faults of the measurement in the light of a diagnosis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
@@ -42,11 +42,9 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
-    first = found(accounted)
-    if any(f.corrected and not _plain(f) for f in accounted.faults):
-        uncorrected = accounted.corrected_for([f for f in accounted.faults if _plain(f)])
-        if first.diagnosis.verdict == UNKNOWN or _may_change(uncorrected):
-            first = _instead(first, found(uncorrected))
+    removable = any(f.corrected and not _plain(f) for f in accounted.faults)
+    if removable and (first.diagnosis.verdict == UNKNOWN or may_change(accounted)):
+        first = _instead(first, found(accounted.corrected_for([f for f in accounted.faults if _plain(f)])))
     answer, faults = first.diagnosis.answer, first.accounted.faults
     beside = len(faults) > 0 or first.accounted is not accounted
     if answer is None or (first.diagnosis.left <= TOLERANCE and not (beside and len(answer.entries) > 1)):
@@ -65,9 +63,9 @@ def diagnose_accounted(
     return again if better else first
 
 
-def _may_change(accounted: Accounted) -> bool:
-    """Whether a coefficient may change along the record, which scales and turns the response as an instrument does."""
-    changes = promise(accounted.comparison)
+def may_change(accounted: Accounted) -> bool:
+    """Whether a coefficient may change along the record as it was given, which looks like many a fault."""
+    changes = promise(replace(accounted.comparison, prepared=accounted.given))
     return changes is not None and changes.alone
 
 
