@@ -1,7 +1,7 @@
 """Faults of the measurement in the light of a diagnosis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
@@ -40,15 +40,20 @@ def diagnose_accounted(
 
     first = found(accounted)
     answer = first.diagnosis.answer
-    if answer is None or (first.diagnosis.left <= TOLERANCE and not (accounted.faults and len(answer.entries) > 1)):
+    if answer is None:
         return first
     model = accounted.comparison.model
+    noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
+    if first.diagnosis.left <= TOLERANCE and not (noisy or (accounted.faults and len(answer.entries) > 1)):
+        return first
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
         faults = accounted.faults_beside(answer.fit, model)
         if same(faults, accounted.faults):
-            return first
+            known = {(fault.fault, fault.channel) for fault in first.faults}
+            said = tuple(f for f in faults if not f.corrected and (f.fault, f.channel) not in known)
+            return replace(first, faults=(*first.faults, *said))
         again = found(accounted.corrected_for(faults))
     except StudyError:
         return first
