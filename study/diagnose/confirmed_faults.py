@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
-from study.diagnose.verdict import Diagnosis
+from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import Fault
@@ -30,7 +30,9 @@ def diagnose_accounted(
 
     What a model lacks hides faults and imitates others. So where a set of effects is found, or something is left beside
     what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
-    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Arguments as for
+    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Where nothing is found in
+    a corrected record, what was corrected may have been the motion that is missing: then the record is diagnosed
+    without what the model alone told of its faults. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
 
@@ -39,26 +41,35 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
-    answer = first.diagnosis.answer
+    if first.diagnosis.verdict == UNKNOWN and any(f.corrected and not _plain(f) for f in accounted.faults):
+        uncorrected = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
+        first = uncorrected if uncorrected.diagnosis.answer is not None else first
+    answer, faults = first.diagnosis.answer, first.accounted.faults
     if answer is None:
         return first
     model = accounted.comparison.model
+    beside = len(faults) > 0 or first.accounted is not accounted
     noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
-    if first.diagnosis.left <= TOLERANCE and not (noisy or (accounted.faults and len(answer.entries) > 1)):
+    if first.diagnosis.left <= TOLERANCE and not (noisy or (beside and len(answer.entries) > 1)):
         return first
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
-        faults = accounted.faults_beside(answer.fit, model)
-        if same(faults, accounted.faults):
+        shown = accounted.faults_beside(answer.fit, model)
+        if same(shown, faults):
             known = {(fault.fault, fault.channel) for fault in first.faults}
-            said = tuple(f for f in faults if not f.corrected and (f.fault, f.channel) not in known)
+            said = tuple(f for f in shown if not f.corrected and (f.fault, f.channel) not in known)
             return replace(first, faults=(*first.faults, *said))
-        again = found(accounted.corrected_for(faults))
+        again = found(accounted.corrected_for(shown))
     except StudyError:
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _plain(fault: Fault) -> bool:
+    """Whether a fault shows in the record itself, or is known, whatever model is held beside it."""
+    return fault.held or fault.lost is not None
 
 
 def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:
