@@ -303,9 +303,10 @@ def _noisy_force(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> 
     forces = [] if known else [channel for name, channel in open_ones if name == FORCE_NOISE]
     if not forces or force_noise(stage.rich, forces, asked, repeats=1) is None:
         return None
-    if len(stage.rich.fit.model.coordinates) > 1:  # whose many effects at many places take long to be searched for
-        left = left_by(stage.rich.fit, stage.rich.prepared)
-        if significant_share(left, ALPHA) > OF_MOTION:
+    fit = stage.rich.fit
+    if len(fit.model.coordinates) > 1:  # whose many effects at many places take long to be searched for
+        lost = not fit.converged or fit.undecided
+        if lost or significant_share(left_by(fit, stage.rich.prepared), ALPHA) > OF_MOTION:
             return None
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
