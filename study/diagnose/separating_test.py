@@ -19,7 +19,7 @@ from study.support.numbers import enumerated, percent
 
 LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)
 DISTINCT = 5.0  # standard errors by which the responses must differ
-LONGEST = 16384  # samples simulated
+SIMULATED = 16384  # samples at most
 APART = 2.0  # times the error of the prediction by which two places must differ at a sensor that would tell them
 
 
@@ -57,12 +57,12 @@ def _at_level(prepared: Prepared, level: float) -> tuple[Record, tuple[int, int]
 
     That state is None where each of the record's stretches begins from rest.
     """
-    record, response, span = prepared.record, prepared.response, prepared.shortened(LONGEST).plan.fit
+    record, response, span = prepared.record, prepared.response, prepared.shortened(SIMULATED).plan.fit
     if response == FORCE:
         return record.with_channels({m: level * record[m] for m in MOTIONS if m in record}), span, None
     if prepared.free:
         stretch = (*record.stretches, Stretch(record, *span))[0]
-        last = min(len(stretch.source), stretch.first + LONGEST)
+        last = min(len(stretch.source), stretch.first + SIMULATED)
         begin = starting_states(stretch.source, prepared.outputs, (stretch.first,))
         return stretch.source, (stretch.first, last), level * begin
     return record.with_channels({name: level * record[name] for name in record.forces}), span, None
