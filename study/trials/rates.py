@@ -18,7 +18,7 @@ from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, LIKE_RIGS, STRUCTURES, TRIALS, Row, rows_of
+from study.trials.kept import BY_TEST, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
@@ -204,6 +204,11 @@ def _effects(*counts: int) -> Member:
     return lambda row: row["hidden"] != "" and (row["hidden"] != NONE) * (row["hidden"].count("+") + 1) in counts
 
 
+def _promised(least: float, most: float = math.inf) -> Member:
+    """Of ties that a test was proposed for: promised so much, and less than the other."""
+    return lambda row: least <= row["promise"] < most
+
+
 def _both(row: Row) -> float:
     return _is("effect_first")(row) * _is("place_first")(row)
 
@@ -271,16 +276,33 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   _is("holds"), "holds"),
             Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
         ),
+        NEXT_TESTS: (
+            Reach("ties that end in the right effect, where 95 % or more was promised", _promised(0.95), _is("decided"),
+                  "sure"),
+            Reach("... where 80 to 95 % was promised", _promised(0.8, 0.95), _is("decided"), "likely"),
+            Reach("... where less was promised", _promised(0.0, 0.8), _is("decided")),
+            Reach("... after a random test that is allowed and as long, where 80 % or more was promised of the other",
+                  _promised(0.8), _is("random_decided")),
+            Reach("all ties, after the proposed test", _promised(0.0), _is("decided")),
+            Reach("all ties, after a random test", _promised(0.0), _is("random_decided")),
+            Reach("mean size of the promise, where 80 to 95 % was promised", _promised(0.8, 0.95), _number("promise"),
+                  size=True),
+            Reach("mean size of the promise, where less was promised", _promised(0.0, 0.8), _number("promise"),
+                  size=True),
+        ),
     }
 )  # fmt: skip
 # Columns of a page.
-GROUPS: Mapping[str, str] = MappingProxyType({TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: ""})
+GROUPS: Mapping[str, str] = MappingProxyType(
+    {TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: "", NEXT_TESTS: ""}
+)
 WANTED: Mapping[str, Wanted] = MappingProxyType(
     {
         STRUCTURES: {
             "first": (0.9,), "first_in_noise": (0.8,), "tied": (0.95,), "nothing": (0.95,), "error": (0.9,),
             "held": (0.95,),
         },
+        NEXT_TESTS: {"sure": (0.9,), "likely": (0.8,)},
         LIKE_RIGS: {"two": (0.85,), "three": (0.75,), "there": (0.95,), "nothing": (0.98,), "holds": (0.95,)},
     }
 )  # fmt: skip

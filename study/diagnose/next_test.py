@@ -1,0 +1,281 @@
+"""Which test next: the one that decides between models that a record cannot tell apart.
+
+All designs within the limits are compared by what each separates by sensitivities (``separation``). The best is then
+rehearsed: rivals are simulated in it with noise, each time with coefficients that this record allows, and all are
+fitted to this record and the test together, and compared, as a diagnosis of both does it. The promise is that of the
+rehearsals.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from scipy.special import ndtr
+
+from study.compare.prediction import predict
+from study.diagnose.designs import AS_WAS, LET_GO, Design, Limits, PresentTest
+from study.diagnose.held_out import held_out
+from study.diagnose.ranked import Ranked
+from study.diagnose.separation import Rivals, allowed, respond, shortened
+from study.diagnose.verdict import Diagnosis
+from study.equations.model import free
+from study.identify.time_domain.fit_model import with_term
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part, linearise
+from study.identify.time_domain.settling import better_fit
+from study.identify.time_domain.shape_search import baseline
+from study.identify.time_domain.weighted_fit import noise_left
+from study.records.driven_by_motion import on_a_moving_base
+from study.records.interpolation import between_samples
+from study.records.outputs import Noise
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS, Record, Sensor
+from study.records.record_layout import Layout
+from study.support import statistics
+from study.support.arrays import Floats
+from study.support.errors import StudyError, expect
+from study.support.thresholds import K
+from study.way_in.compare_records import made_ready
+
+Doing = Callable[[str], None]  # called with what is done next
+DECIDES = 0.95  # probability with which a test is to decide
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A test, what it separates, and how sure that is."""
+
+    design: Design
+    sensor: Sensor | None  # one that the test needs beside those of the record
+    pairs: Floats  # probability that each pair of rivals is told apart, the one of the row being true, shape (r, r)
+    promise: float  # probability that the true rival stands alone at the end
+    rehearsed: int = 0  # times that it was simulated; none: by sensitivities alone
+
+
+@dataclass(frozen=True, eq=False)
+class NextTest:
+    """Which test decides between rivals."""
+
+    rivals: Rivals
+    limits: Limits
+    choice: Choice
+    again: Choice | None  # the same test as this record's; None where even that breaks the limits
+    asked: int  # how many tests were compared
+
+
+def tied_rows(diagnosis: Diagnosis, most: int = 5) -> tuple[Ranked, ...]:
+    """The answer of a diagnosis and those that the record cannot tell from it, the first of them.
+
+    Raises
+    ------
+    StudyError
+        If there is no tie.
+    """
+    name = diagnosis.comparison.record.name
+    expect(
+        diagnosis.answer is not None and len(diagnosis.sets) > 1,
+        f"{name}: the verdict is {diagnosis.verdict.replace('_', ' ')}, and nothing is tied with another; expected a "
+        "record whose diagnosis ends in a tie, or --precision KEY=PERCENT",
+    )
+    return diagnosis.sets[:most]
+
+
+def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 8, progress: Doing = lambda _: None) -> NextTest:
+    """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
+
+    Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet.
+
+    Raises
+    ------
+    StudyError
+        If the limits allow no test.
+    """
+    progress("comparing tests")
+    fits, present = rivals.fits, rivals.present
+    screened = (_screened(rivals, design) for design in allowed(fits, present, limits))
+    found = [choice for choice in screened if choice is not None]
+    again = next((c for c in found if c.design.kind == AS_WAS and c.design.level == 1.0), None)
+    asked = len(found)
+    found.sort(key=lambda choice: -choice.promise)
+    good = [choice for choice in found if choice.promise >= DECIDES]
+    if good:
+        progress("comparing shorter tests")
+        tried = [d for one in good[:12] for d in shortened(fits, present, limits, one.design)]
+        asked += len(tried)
+        shorter = [c for d in tried if (c := _screened(rivals, d)) is not None and c.promise >= DECIDES]
+        cheap = min([*good, *shorter], key=lambda choice: choice.design.effort)
+        found = [cheap, *(choice for choice in found if choice is not cheap)]
+    else:
+        further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in further_sensors(rivals)]
+        asked += len(further)
+        found = sorted([*found, *(choice for choice in further if choice is not None)], key=lambda c: -c.promise)
+    best = found[0]
+    if rehearsals:
+        heard = list[Choice]()
+        for choice in (found[0], *islice(_different(found[1:]), 2)):
+            progress(f"rehearsing the {choice.design.kind}")
+            heard.append(rehearsed(rivals, choice, rehearsals))
+            if heard[-1].promise >= DECIDES:
+                break
+        best = max(heard, key=lambda choice: choice.promise)
+        again = again and rehearsed(rivals, again, rehearsals // 2)
+    return NextTest(rivals, limits, best, again, asked)
+
+
+def _screened(rivals: Rivals, design: Design, sensor: Sensor | None = None) -> Choice | None:
+    """What a test separates by the rivals' sensitivities; None where one of them does not stay finite."""
+    try:
+        distances = rivals.distances(design, sensor)
+    except StudyError:
+        return None
+    pairs = rivals.decided(distances, alone=sensor is not None)
+    return Choice(design, sensor, pairs, rivals.promise(pairs))
+
+
+def _different(found: Sequence[Choice]) -> Iterator[Choice]:
+    """The first of each kind of test, band and sensor."""
+    seen = set[tuple[str, str, Sensor | None]]()
+    for choice in found:
+        what = choice.design.kind, choice.design.place, choice.sensor
+        if what not in seen:
+            seen.add(what)
+            yield choice
+
+
+def further_sensors(rivals: Rivals) -> tuple[Sensor, ...]:
+    """Motions of any coordinate that the record does not show."""
+    if rivals.present.prescribed:
+        return ()
+    known = rivals.prepared.outputs.sensors
+    every = (Sensor(c, m) for c in rivals.rows[0].fit.model.coordinates for m in MOTIONS)
+    return tuple(sensor for sensor in every if sensor not in known)
+
+
+def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
+    """A test with what it decides when it is simulated, with noise, and judged together with this record.
+
+    The true rival is drawn by how likely each is, its coefficients by their covariance. By how many standard errors the
+    closest rival leaves more is normal, with a variance of one or what the draws show: P is the share above K of that.
+    Where the test cannot be judged together with this record the choice is as it was.
+    """
+    rng, count = np.random.default_rng(1), len(rivals.rows)
+    sums, drawn = np.zeros((count, count)), np.zeros(count)
+    closest = list[float]()
+    for place in (np.arange(times) + 0.5) / times:
+        true = int(np.searchsorted(np.cumsum(rivals.likely), place))
+        try:
+            behind = compared_in(rivals, simulated(rivals, choice, true, rng), true, alone=choice.sensor is not None)
+        except StudyError:
+            continue
+        sums[true] += ndtr(behind - K)
+        drawn[true] += 1.0
+        closest.append(float(np.min(np.delete(behind, true))))
+    if len(closest) < max(2, times // 2):
+        return choice
+    pairs = np.where(drawn[:, None] > 0.0, sums / np.maximum(drawn, 1.0)[:, None], choice.pairs)
+    np.fill_diagonal(pairs, 1.0)
+    spread = max(1.0, float(np.std(closest, ddof=1))) * np.sqrt(1.0 + 1.0 / len(closest))
+    return replace(choice, pairs=pairs, promise=float(ndtr((np.mean(closest) - K) / spread)), rehearsed=len(closest))
+
+
+def simulated(rivals: Rivals, choice: Choice, true: int, rng: np.random.Generator) -> Record:
+    """The record of a test if one rival is true, with coefficients that this record allows and noise like its own."""
+    row, design = rivals.rows[true], choice.design
+    outputs, noise = rivals.seen(choice.sensor)
+    values, vectors = np.linalg.eigh(rivals.covariances[true])
+    drawn = np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values))
+    moved = row.fit.values + vectors @ drawn
+    try:
+        shown = respond(replace(row.fit, values=moved), design, outputs.sensors)[0]
+    except StudyError:
+        shown = respond(row.fit, design, outputs.sensors)[0]
+    added = outputs.apart(_coloured(rivals.size * rng.standard_normal(shown.size), noise, len(outputs)))
+    return record_of_test(design, dict(zip(map(str, outputs.sensors), (shown + added).T, strict=True)))
+
+
+def _coloured(white: Floats, noise: Noise, sensors: int) -> Floats:
+    """Noise that is white once it is filtered with each sensor's coefficients, stacked, shape (n s,)."""
+    if not noise:
+        return white
+    values = white.reshape(-1, sensors)
+    gains = [np.fft.rfft(own, len(values)) for own in noise]
+    parts = [np.fft.irfft(np.fft.rfft(x) / gain, len(values)) for x, gain in zip(values.T, gains, strict=True)]
+    return np.stack(parts, axis=1).ravel()
+
+
+def record_of_test(design: Design, measured: dict[str, Floats]) -> Record:
+    """The record of a test in which this was measured."""
+    record, forces = design.record, design.record.forces
+    driven = {name: values for name, values in record.channels.items() if name not in measured}
+    if "force" in measured:  # of a component
+        return replace(record, channels={**measured, **driven}, name="next test")
+    kept = {name: values for name, values in driven.items() if name in forces or name in record.extra}
+    return replace(record, channels={**kept, **measured}, name="next test")
+
+
+def compared_in(rivals: Rivals, record: Record, true: int, *, alone: bool) -> Floats:
+    """By how many standard errors each rival leaves more than the true one of a record and this one, shape (r,).
+
+    Each is fitted from its values. What has a shape of its own and would lose so is fitted anew from all that may
+    become of it: some effects have others as a limit, as a contact whose gap is zero is a bilinear spring.
+    """
+    joint = judged_together(rivals, record, alone=alone)
+    fits = [fit_part(f.model, joint, f.held, steps=f.steps_per_sample, max_iterations=30) for f in rivals.fits]
+    noise = noise_left(fits[true].residual, len(joint.outputs))
+    white = [_white(fit, joint, noise) for fit in fits]
+    behind = np.array([_behind(own, white[true]) for own in white])
+    for place, row in enumerate(rivals.rows):
+        if place != true and row.flexible and behind[place] > K - 1.0:
+            other = _sought(row, joint)
+            if other is not None and other.rms < fits[place].rms:
+                behind[place] = min(behind[place], _behind(_white(other, joint, noise), white[true]))
+    return behind
+
+
+def _white(fit: FreeRunFit, joint: Prepared, noise: Noise) -> Floats:
+    """What a fit leaves of samples that it was not fitted to, white, shape (n s,)."""
+    return np.concatenate(held_out(fit, predict(fit, joint), linearise(fit, joint), joint).white(joint.outputs, noise))
+
+
+def _behind(one: Floats, other: Floats) -> float:
+    count = min(len(one), len(other))
+    return statistics.worse(one[:count], other[:count])
+
+
+def _sought(row: Ranked, joint: Prepared) -> FreeRunFit | None:
+    """A rival whose effects with a shape of their own are searched for anew; None where that has no finite response."""
+    model, best = row.fit.model, None
+    for entry in (e for e in row.entries if e.term.parameters):
+        without = model.without_term(entry.name)
+        kept = [key for key in row.fit.held if key in without.values]
+        try:
+            beside = fit_part(without, joint, kept, steps=row.fit.steps_per_sample, max_iterations=15)
+            best = better_fit(best, with_term(baseline(beside, joint), free(entry.term, entry.place)))
+        except StudyError:
+            continue
+    return best
+
+
+def judged_together(rivals: Rivals, record: Record, *, alone: bool) -> Prepared:
+    """A record of a test made ready, with those of this record unless it is judged alone."""
+    own = rivals.prepared.record
+    sources = list({id(s.source): s.source for s in own.stretches}.values()) or [own]
+    records = [record] if alone else [*sources, record]
+    return made_ready(records, rivals.rows[0].fit.model, Layout(response=None if alone else rivals.prepared.response))[
+        1
+    ]
+
+
+def driving(
+    present: PresentTest, design: Design, prepared: Prepared, mass: float | None, given: Record
+) -> dict[str, Floats]:
+    """What drives a test, by the channels of the record as it was given and at its rate, shape (n,) each.
+
+    Of a moving base its acceleration; nothing where it is let go.
+    """
+    fine = {name: between_samples(design.record[name], prepared.every)
+            for name in present.drivers if design.kind != LET_GO}  # fmt: skip
+    if on_a_moving_base(given) and "force" in fine:
+        return {"base_acceleration": -fine["force"] / (mass or 1.0)}
+    return fine

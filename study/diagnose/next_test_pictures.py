@@ -1,0 +1,116 @@
+"""What each rival would answer to the test that comes next: as files, and each panel alone (Axes in, Axes out)."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.special import ndtri
+
+from study.diagnose.next_test import DECIDES, NextTest
+from study.diagnose.next_test_report import next_test_in_words, rival_in_words
+from study.diagnose.separation import respond
+from study.equations.dimensions import pretty
+from study.figures import page
+from study.figures.labels import power_of_ten, prefixed
+from study.figures.styles import in_style
+from study.records.interpolation import between_samples
+from study.support.arrays import Floats
+from study.support.numbers import percent
+from study.support.thresholds import K
+
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"linestyle": "-", "color": "C0", "linewidth": 2.2}, {"linestyle": "--", "color": "C1", "linewidth": 1.6},
+    {"linestyle": ":", "color": "C2", "linewidth": 2.0}, {"linestyle": "-.", "color": "C3", "linewidth": 1.5},
+    {"linestyle": (0, (6, 1, 1, 1, 1, 1)), "color": "0.3", "linewidth": 1.3},
+)  # fmt: skip
+
+
+def next_test_pictures(found: NextTest) -> dict[str, bytes]:
+    """The picture by file name, in the project's style."""
+    with in_style():
+        return page.image_files({"next_test": next_test_figure(found)})
+
+
+def next_test_figure(found: NextTest) -> Figure:
+    """What drives the test, what each rival answers where they differ most, and what no coefficient makes up for."""
+    words = next_test_in_words(found).partition(" decides")[0]
+    first = rival_in_words(found.rivals.rows[0], found.rivals.rows)
+    figure, axes = page.empty_page(
+        f"Which test next? {found.rivals.prepared.record.name}", words, rows=3, panel=1.7,
+        legend_rows=page.rows_for(len(found.rivals.rows)), share=False, width=7.6,
+    )  # fmt: skip
+    driving_panel(axes[0], found)
+    answers_panel(axes[1], found)
+    evidence_panel(axes[2], found)
+    evidence = f"evidence against each other if {first} is true"
+    page.letter(axes, ["what drives it", "what each would answer, where they differ most", evidence])
+    page.shared_legend(figure, axes[1:2])
+    return figure
+
+
+def driving_panel(axes: Axes, found: NextTest) -> Axes:
+    """What drives the test along time."""
+    record, present = found.choice.design.record, found.rivals.present
+    names = present.drivers or present.source.forces
+    values = record.columns(names)
+    factor, unit = _easy(present.source.unit(names[0]), values)
+    for own, look in zip(values.T, LOOKS, strict=False):
+        axes.plot(record.dt * np.arange(len(record)), own / factor, **{**look, "linewidth": 0.7})
+    axes.set_ylabel(f"{' and '.join(names)} ({unit})")
+    axes.set_xlabel("time (s)")
+    return axes
+
+
+def answers_panel(axes: Axes, found: NextTest) -> Axes:
+    """The response of each rival at the sensor, and about the time, at which they differ most."""
+    rivals, design = found.rivals, found.choice.design
+    sensors = rivals.seen(found.choice.sensor)[0].sensors
+    answers = np.stack([respond(fit, design, sensors)[0] for fit in rivals.fits])
+    apart = np.max(answers, axis=0) - np.min(answers, axis=0)
+    noise = found.rivals.noise_of(found.choice.sensor)
+    most = int(np.argmax([np.mean(apart[:, i] ** 2) / noise[s] ** 2 for i, s in enumerate(sensors)]))
+    sensor, samples = (
+        sensors[most],
+        min(len(apart), max(32, round(6.0 / (rivals.present.resonance * design.record.dt)))),
+    )
+    at = int(np.argmax(np.convolve(apart[:, most] ** 2, np.ones(samples), "valid")))
+    shown = answers[:, :, most]
+    factor, unit = _easy(rivals.prepared.record.unit(sensor), shown[:, at : at + samples])
+    time = design.record.dt * np.arange(at, at + samples, 0.125)[: 8 * (samples - 1) + 1]
+    for row, own, look in zip(rivals.rows, shown, LOOKS, strict=False):
+        smooth = between_samples(own, 8)[8 * at : 8 * (at + samples - 1) + 1]
+        axes.plot(time, smooth / factor, label=rival_in_words(row, rivals.rows), **look)
+    axes.set_ylabel(f"{sensor} ({unit})")
+    axes.set_xlabel("time (s)")
+    return axes
+
+
+def evidence_panel(axes: Axes, found: NextTest) -> Axes:
+    """How the squares that each rival leaves of the first one's answer add up, over the noise's variance."""
+    rivals, choice = found.rivals, found.choice
+    outputs, noise = rivals.seen(choice.sensor)
+    time = choice.design.record.dt * np.arange(len(choice.design.record))
+    for j, look in list(enumerate(LOOKS))[1 : len(rivals.rows)]:
+        left = outputs.whitened(outputs.stacked(rivals.left(choice.design, 0, j, choice.sensor)), noise) / rivals.size
+        power = np.sum(left.reshape(len(time), -1) ** 2, axis=1)
+        axes.plot(time, np.cumsum(power), **look)
+    needed = (2.0 * (K + float(ndtri(DECIDES)))) ** 2
+    axes.axhline(needed, color="0.35", linewidth=0.9)
+    axes.annotate(f"decides with {percent(DECIDES, '.0f')}", (0.01, needed), xycoords=("axes fraction", "data"), xytext=(0, 2),
+                  textcoords="offset points", va="bottom", fontsize=8)  # fmt: skip
+    axes.set_ylim(0.0, max(1.25 * needed, min(axes.get_ylim()[1], 6.0 * needed)))
+    axes.set_ylabel("evidence")
+    axes.set_xlabel("time (s)")
+    return axes
+
+
+def _easy(unit: str, values: Floats) -> tuple[float, str]:
+    """A divisor, and what to write for the unit, with which values are easy to read."""
+    largest = float(np.max(np.abs(values)))
+    factor, shown = prefixed(unit, largest)
+    more, power = power_of_ten(largest / factor)
+    return factor * more, pretty(f"{power}{shown}")
