@@ -68,13 +68,11 @@ def _run(arguments: argparse.Namespace) -> None:
         if arguments.precision:
             fit = (diagnosis.answer or diagnosis.comparison).fit
             step("comparing tests")
-            words, files = precise_plan(
-                precise_test(fit, diagnosis.comparison.prepared, *arguments.precision, asked), records[0]
-            )
+            words, files = precise_plan(precise_test(fit, diagnosis.comparison.prepared, *arguments.precision, asked))
         else:
             rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
             limits = limits_asked(rivals.fits, rivals.present, *asked)
-            words, files = deciding_plan(next_test(rivals, limits, progress=step), records[0])
+            words, files = deciding_plan(next_test(rivals, limits, progress=step))
     write_files(folder, files, inputs_of(arguments))
     print(f"{words}\n\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 

@@ -91,7 +91,9 @@ class PresentTest:
     def design(self, kind: str, place: str, samples: int, level: float) -> Design:
         """A test of a kind in a band, of so many samples; of what was measured no more than there is."""
         samples = min(samples, len(self.source)) if kind == AS_WAS else samples
-        waves = np.stack([self._wave(kind, place, samples, i) for i in range(len(self.drivers))], axis=1)
+        waves = np.zeros((samples, len(self.drivers)))
+        for i in range(len(self.drivers)):
+            waves[:, i] = self._wave(kind, place, samples, i)
         begin = np.zeros(2 * self.coordinates)
         if kind == LET_GO:
             begin = level * self.deflection

@@ -8,6 +8,7 @@ rehearsals.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import islice
 
 import numpy as np
@@ -17,7 +18,7 @@ from study.compare.prediction import predict
 from study.diagnose.designs import AS_WAS, LET_GO, Design, Limits, PresentTest
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked
-from study.diagnose.separation import Rivals, allowed, respond, shortened
+from study.diagnose.separation import Rivals, allowed, own_limits, respond, rivals_of, shortened
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import free
 from study.identify.time_domain.fit_model import with_term
@@ -26,11 +27,11 @@ from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.settling import better_fit
 from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import noise_left
-from study.records.driven_by_motion import on_a_moving_base
+from study.records.driven_by_motion import SAID
 from study.records.interpolation import between_samples
 from study.records.outputs import Noise
-from study.records.prepared import Prepared
-from study.records.record import MOTIONS, Record, Sensor
+from study.records.prepared import FORCE, Prepared
+from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.record_layout import Layout
 from study.support import statistics
 from study.support.arrays import Floats
@@ -267,15 +268,28 @@ def judged_together(rivals: Rivals, record: Record, *, alone: bool) -> Prepared:
     ]
 
 
-def driving(
-    present: PresentTest, design: Design, prepared: Prepared, mass: float | None, given: Record
-) -> dict[str, Floats]:
-    """What drives a test, by the channels of the record as it was given and at its rate, shape (n,) each.
+def driving(present: PresentTest, design: Design, prepared: Prepared, mass: float | None) -> dict[str, Floats]:
+    """What drives a test, at the rate at which the record was sampled, shape (n,) each; nothing where it is let go.
 
-    Of a moving base its acceleration; nothing where it is let go.
+    Of a single ``mass`` on a moving base that is the base's acceleration.
     """
-    fine = {name: between_samples(design.record[name], prepared.every)
-            for name in present.drivers if design.kind != LET_GO}  # fmt: skip
-    if on_a_moving_base(given) and "force" in fine:
-        return {"base_acceleration": -fine["force"] / (mass or 1.0)}
+    names = present.drivers if design.kind != LET_GO else ()
+    fine = {name: between_samples(design.record[name], prepared.every) for name in names}
+    if FORCE in fine and any(note.startswith(SAID) for note in prepared.notes):
+        return {OF_THE_GROUND: -fine[FORCE] / (mass or 1.0)}
     return fine
+
+
+@lru_cache(maxsize=4)
+def suggested(diagnosis: Diagnosis) -> NextTest | None:
+    """The test after a tie within twice what the record reached, by sensitivities alone; None without a tie.
+
+    None, too, where a record cannot be made louder, as one that is of no motion at all.
+    """
+    if diagnosis.answer is None or len(diagnosis.sets) < 2:
+        return None
+    rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
+    try:
+        return next_test(rivals, own_limits(rivals.fits, rivals.present, 2.0), rehearsals=0)
+    except StudyError:
+        return None

@@ -18,7 +18,7 @@ from study.diagnose.ranked import Ranked
 from study.figures.labels import prefixed
 from study.records.interpolation import between_samples
 from study.records.prepared import Prepared
-from study.records.record import MOTIONS, Record, Sensor
+from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Floats
 from study.support.numbers import enumerated, percent
 
@@ -53,16 +53,21 @@ def next_test_in_words(found: NextTest) -> str:
     return " ".join(words)
 
 
-def advice_in_words(found: NextTest) -> str:
-    """The same in a line or two beside a diagnosis, which knows no limits of the user's."""
-    within = "twice the force and motion of this record"
+def advice_in_words(found: NextTest | None) -> str:
+    """The test that comes next in a line or two beside a diagnosis, which knows no limits of the user's."""
+    if found is None:
+        return ""
+    within = "within twice the force and motion of this record"
     if found.choice.promise < 0.5:
         return (
-            f"No test within {within} is likely to decide between them (the best of {found.asked}: "
-            f"{_sure(found.choice.promise)}); 'study plan' takes other limits."
+            f"Of {found.asked} tests {within} none is likely to decide between them; 'study plan' takes other limits."
         )
-    words = next_test_in_words(found).partition(" Of ")[0]
-    return f"Within {within}: {words[0].lower()}{words[1:]} 'study plan' writes it, for limits of yours."
+    test = design_in_words(found.choice.design, found.rivals.present)
+    needs = "" if found.choice.sensor is None else f" with a sensor of {_sensor_in_words(found.choice.sensor)}"
+    return (
+        f"The test that is most likely to decide between them {within}: {test}{needs}; 'study plan' rehearses it, says "
+        "how sure it is, and writes its force."
+    )
 
 
 def _same(one: Choice, other: Choice) -> bool:
@@ -174,20 +179,20 @@ def precise_test_fields(found: PreciseTest) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def deciding_plan(found: NextTest, given: Record) -> tuple[str, dict[str, bytes]]:
-    """A test that decides: what to print, and the content of its files; ``given`` is the record as it was read."""
+def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
+    """A test that decides: what to print, and the content of its files."""
     from study.diagnose.next_test_pictures import next_test_pictures  # which would make the page begin later
 
     said, rivals = next_test_in_words(found), found.rivals
-    driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"), given)
+    driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"))
     scale, files = _plan_files(next_test_fields(found), said, found.limits, driven, rivals.prepared)
     return f"{pair_table(found)}\n\n{said}{scale}", files | next_test_pictures(found)
 
 
-def precise_plan(found: PreciseTest, given: Record) -> tuple[str, dict[str, bytes]]:
+def precise_plan(found: PreciseTest) -> tuple[str, dict[str, bytes]]:
     """The same of a test for the sake of precision."""
     said, mass = precise_test_in_words(found), found.fit.model.values.get("m")
-    driven = driving(found.present, found.design, found.prepared, mass, given)
+    driven = driving(found.present, found.design, found.prepared, mass)
     scale, files = _plan_files(precise_test_fields(found), said, found.limits, driven, found.prepared)
     return f"{said}{scale}", files
 

@@ -216,8 +216,8 @@ def _judged_test(_: Order, trial: Trial) -> Row:
     return row
 
 
-def _judged_planned(_: Order, trial: Trial) -> Row:
-    return judged_next_test(trial)
+def _judged_planned(order: Order, trial: Trial) -> Row:
+    return judged_next_test(trial, order.seed)
 
 
 def _judged_structure(_: Order, trial: Trial) -> Row:
