@@ -186,7 +186,7 @@ def _deflection(prepared: Prepared, fit: FreeRunFit, drivers: tuple[str, ...], p
 def possible_designs(
     present: PresentTest, limits: Limits, reached: Callable[[Design], float], shares: tuple[float, ...]
 ) -> Iterator[Design]:
-    """Tests within the limits, each kind as loud as it may be, and in ``shares`` of that.
+    """Tests within the limits, each kind as loud as it may be, and in ``shares`` of that, down to the record's level.
 
     ``reached`` gives what a test reaches of the limits of motion, and of a component's force, over these: one at most,
     whatever the truth, or infinite where it does not stay finite.
@@ -198,7 +198,7 @@ def possible_designs(
             loudest = _loudest(make, present, limits, reached)
         except StudyError:  # a band without a line, a channel that only the record has
             continue
-        levels = [share * loudest for share in shares]
+        levels = [share * loudest for share in shares if share > 0.3 or share * loudest >= 1.0]
         levels += [1.0] if kind == AS_WAS and loudest >= 1.0 else []
         yield from (make(level) for level in levels if level > 0.0)
 

@@ -41,6 +41,7 @@ from study.way_in.compare_records import made_ready
 
 Doing = Callable[[str], None]  # called with what is done next
 DECIDES = 0.95  # probability with which a test is to decide
+WORTH = 0.3  # ... by sensitivities, from which on a test is worth a rehearsal
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +51,17 @@ class Choice:
     design: Design
     sensor: Sensor | None  # one that the test needs beside those of the record
     pairs: Floats  # probability that each pair of rivals is told apart, the one of the row being true, shape (r, r)
-    promise: float  # probability that the true rival stands alone at the end
     rehearsed: int = 0  # times that it was simulated; none: by sensitivities alone
+
+    @property
+    def promise(self) -> float:
+        """Probability that the true rival is told from its closest, whichever is true: the smallest of the pairs."""
+        return float(np.min(self.pairs))
+
+    @property
+    def merit(self) -> tuple[float, float]:
+        """By which tests are compared: where none tells the closest pair, those that tell most others are better."""
+        return round(self.promise, 2), float(np.mean(self.pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +75,7 @@ class NextTest:
     asked: int  # how many tests were compared
 
 
-def tied_rows(diagnosis: Diagnosis, most: int = 5) -> tuple[Ranked, ...]:
+def tied_rows(diagnosis: Diagnosis, most: int = 6) -> tuple[Ranked, ...]:
     """The answer of a diagnosis and those that the record cannot tell from it, the first of them.
 
     Raises
@@ -82,10 +92,11 @@ def tied_rows(diagnosis: Diagnosis, most: int = 5) -> tuple[Ranked, ...]:
     return diagnosis.sets[:most]
 
 
-def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 8, progress: Doing = lambda _: None) -> NextTest:
+def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: Doing = lambda _: None) -> NextTest:
     """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
 
-    Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet.
+    Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet. Of the tests that
+    promise most up to three are rehearsed, so many times with each rival true.
 
     Raises
     ------
@@ -98,7 +109,7 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 8, progress: 
     found = [choice for choice in screened if choice is not None]
     again = next((c for c in found if c.design.kind == AS_WAS and c.design.level == 1.0), None)
     asked = len(found)
-    found.sort(key=lambda choice: -choice.promise)
+    found.sort(key=lambda choice: choice.merit, reverse=True)
     good = [choice for choice in found if choice.promise >= DECIDES]
     if good:
         progress("comparing shorter tests")
@@ -110,17 +121,18 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 8, progress: 
     else:
         further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in further_sensors(rivals)]
         asked += len(further)
-        found = sorted([*found, *(choice for choice in further if choice is not None)], key=lambda c: -c.promise)
+        every = [*found, *(choice for choice in further if choice is not None)]
+        found = sorted(every, key=lambda choice: choice.merit, reverse=True)
     best = found[0]
-    if rehearsals:
+    if rehearsals and best.promise >= WORTH:
         heard = list[Choice]()
         for choice in (found[0], *islice(_different(found[1:]), 2)):
             progress(f"rehearsing the {choice.design.kind}")
             heard.append(rehearsed(rivals, choice, rehearsals))
             if heard[-1].promise >= DECIDES:
                 break
-        best = max(heard, key=lambda choice: choice.promise)
-        again = again and rehearsed(rivals, again, rehearsals // 2)
+        best = max(heard, key=lambda choice: choice.merit)
+        again = rehearsed(rivals, again, rehearsals) if again and again.promise >= WORTH else again
     return NextTest(rivals, limits, best, again, asked)
 
 
@@ -131,7 +143,7 @@ def _screened(rivals: Rivals, design: Design, sensor: Sensor | None = None) -> C
     except StudyError:
         return None
     pairs = rivals.decided(distances, alone=sensor is not None)
-    return Choice(design, sensor, pairs, rivals.promise(pairs))
+    return Choice(design, sensor, pairs)
 
 
 def _different(found: Sequence[Choice]) -> Iterator[Choice]:
@@ -156,28 +168,25 @@ def further_sensors(rivals: Rivals) -> tuple[Sensor, ...]:
 def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
     """A test with what it decides when it is simulated, with noise, and judged together with this record.
 
-    The true rival is drawn by how likely each is, its coefficients by their covariance. By how many standard errors the
-    closest rival leaves more is normal, with a variance of one or what the draws show: P is the share above K of that.
-    Where the test cannot be judged together with this record the choice is as it was.
+    By how many standard errors a rival leaves more than the true one is normal, with a variance of one or what the
+    rehearsals show about their means. Where the test cannot be judged so, the choice is as it was.
     """
     rng, count = np.random.default_rng(1), len(rivals.rows)
-    sums, drawn = np.zeros((count, count)), np.zeros(count)
-    closest = list[float]()
-    for place in (np.arange(times) + 0.5) / times:
-        true = int(np.searchsorted(np.cumsum(rivals.likely), place))
-        try:
-            behind = compared_in(rivals, simulated(rivals, choice, true, rng), true, alone=choice.sensor is not None)
-        except StudyError:
-            continue
-        sums[true] += ndtr(behind - K)
-        drawn[true] += 1.0
-        closest.append(float(np.min(np.delete(behind, true))))
-    if len(closest) < max(2, times // 2):
-        return choice
-    pairs = np.where(drawn[:, None] > 0.0, sums / np.maximum(drawn, 1.0)[:, None], choice.pairs)
-    np.fill_diagonal(pairs, 1.0)
-    spread = max(1.0, float(np.std(closest, ddof=1))) * np.sqrt(1.0 + 1.0 / len(closest))
-    return replace(choice, pairs=pairs, promise=float(ndtr((np.mean(closest) - K) / spread)), rehearsed=len(closest))
+    means, spreads = np.full((count, count), np.inf), list[Floats]()
+    for true in range(count):
+        behind = list[Floats]()
+        for _ in range(times):
+            try:
+                record = simulated(rivals, choice, true, rng)
+                behind.append(np.delete(compared_in(rivals, record, true, alone=choice.sensor is not None), true))
+            except StudyError:
+                continue
+        if len(behind) < times:
+            return choice
+        means[true, np.arange(count) != true] = np.mean(behind, axis=0)
+        spreads.append(np.var(behind, axis=0, ddof=1) if times > 1 else np.ones(count - 1))
+    spread = np.sqrt(max(1.0, float(np.mean(spreads))) * (1.0 + 1.0 / times))
+    return replace(choice, pairs=ndtr((means - K) / spread), rehearsed=count * times)
 
 
 def simulated(rivals: Rivals, choice: Choice, true: int, rng: np.random.Generator) -> Record:

@@ -100,8 +100,10 @@ def evidence_panel(axes: Axes, found: NextTest) -> Axes:
         axes.plot(time, np.cumsum(power), **look)
     needed = (2.0 * (K + float(ndtri(DECIDES)))) ** 2
     axes.axhline(needed, color="0.35", linewidth=0.9)
-    axes.annotate(f"decides with {percent(DECIDES, '.0f')}", (0.01, needed), xycoords=("axes fraction", "data"), xytext=(0, 2),
-                  textcoords="offset points", va="bottom", fontsize=8)  # fmt: skip
+    axes.annotate(
+        f"decides with {percent(DECIDES, '.0f')}", (0.01, needed), xycoords=("axes fraction", "data"),
+        xytext=(0, 2), textcoords="offset points", va="bottom", fontsize=8,
+    )  # fmt: skip
     axes.set_ylim(0.0, max(1.25 * needed, min(axes.get_ylim()[1], 6.0 * needed)))
     axes.set_ylabel("evidence")
     axes.set_xlabel("time (s)")

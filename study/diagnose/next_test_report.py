@@ -141,11 +141,10 @@ def pair_table(found: NextTest) -> str:
     rows = found.rivals.rows
     names = [rival_in_words(row, rows) for row in rows]
     cells = [
-        [name, percent(found.rivals.likely[i], ".0f")]
-        + ["-" if i == j else _sure(float(found.choice.pairs[i, j])) for j in range(len(rows))]
+        [name, *("-" if i == j else _sure(float(found.choice.pairs[i, j])) for j in range(len(rows)))]
         for i, name in enumerate(names)
     ]
-    head = ["if true", "likely by now", *(f"told from {name}" for name in names)]
+    head = ["if true", *(f"told from {name}" for name in names)]
     return tabulate(cells, head, tablefmt="simple", disable_numparse=True)
 
 
@@ -153,8 +152,7 @@ def next_test_fields(found: NextTest) -> dict[str, Any]:
     """What ``plan.json`` holds."""
     rows = found.rivals.rows
     return {
-        "rivals": [{"effects": list(row.names), "likely": float(p)}
-                   for row, p in zip(rows, found.rivals.likely, strict=True)],
+        "rivals": [list(row.names) for row in rows],
         "test": design_fields(found.choice.design), "promise": found.choice.promise,
         "sensor": None if found.choice.sensor is None else str(found.choice.sensor),
         "told_apart": found.choice.pairs.tolist(), "rehearsed": found.choice.rehearsed,

@@ -74,12 +74,6 @@ class Rivals:
         return np.asarray(0.25 * power.shape[1] * np.var(difference, axis=2, ddof=1), dtype=np.float64)
 
     @cached_property
-    def likely(self) -> Floats:
-        """How probable each is, by its likelihood on held-out samples, shape (r,)."""
-        odds = np.exp(-0.5 * (self.ahead[0] - np.min(self.ahead[0])))
-        return odds / np.sum(odds)
-
-    @cached_property
     def covariances(self) -> tuple[Floats, ...]:
         """Of the coefficients of each, as far as this record tells them."""
         return tuple(known_of(fit, self.prepared) for fit in self.fits)
@@ -161,10 +155,6 @@ class Rivals:
         found = ndtr((ahead + distances) / error - K)
         np.fill_diagonal(found, 1.0)
         return np.asarray(found, dtype=np.float64)
-
-    def promise(self, pairs: Floats) -> float:
-        """Probability that the true rival stands alone at the end: that of its closest, over what is likely true."""
-        return float(self.likely @ np.min(pairs, axis=1))
 
 
 def rivals_of(rows: Sequence[Ranked], prepared: Prepared) -> Rivals:
@@ -254,7 +244,9 @@ def allowed(
         "fitted and judged",
     )
     most = replace(limits, length=min(length or limits.length, 8192 * present.source.dt))
-    found = list(possible_designs(present, most, lambda d: reached(fits, present, d, limits), (1.0, 0.6, 0.35)))
+    found = list(
+        possible_designs(present, most, lambda d: reached(fits, present, d, limits), (1.0, 0.6, 0.35, 0.2, 0.1, 0.05))
+    )
     expect(
         found,
         f"the limits (force {limits.force:g}, displacement {limits.displacement:g}, length {limits.length:g} s) allow "
@@ -279,8 +271,8 @@ def shortened(fits: Sequence[FreeRunFit], present: PresentTest, limits: Limits, 
 
 
 def shortest(present: PresentTest) -> float:
-    """Length in seconds that a test has at least: some periods of the motion to fit, and some to judge."""
-    return max(256 * present.source.dt, 20.0 / present.resonance)
+    """Length in seconds that a test has at least: some periods of the motion to fit and to judge, or the record's."""
+    return min(max(256 * present.source.dt, 20.0 / present.resonance), len(present.source) * present.source.dt)
 
 
 def root_of_inverse(covariance: Floats) -> Floats:

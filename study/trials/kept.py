@@ -70,12 +70,12 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
         ),
         NEXT_TESTS: KeptTable(
             (
-                "test", "seed", "noise", "hidden", "verdict", "tie_set", "likely", "asked", "design", "band", "level",
+                "test", "seed", "noise", "hidden", "verdict", "tie_set", "asked", "design", "band", "level",
                 "length", "sensor", "promise", "promise_as_was", "decided", "ends_in", "random_design", "random_band",
                 "random_decided", "seconds", "trouble",
             ),
             (
-                "tie_set", "likely", "asked", "design", "band", "level", "length", "sensor", "promise",
+                "tie_set", "asked", "design", "band", "level", "length", "sensor", "promise",
                 "promise_as_was", "decided", "ends_in", "random_design", "random_band", "random_decided", "trouble",
             ),
         ),

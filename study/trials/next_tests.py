@@ -34,9 +34,8 @@ def judged_next_test(trial: Trial, seed: int) -> Row:
     limits = own_limits(rivals.fits, rivals.present, LOUDER)
     found = next_test(rivals, limits)
     choice, again = found.choice, found.again
-    of_truth = [p for row, p in zip(rivals.rows, rivals.likely.tolist(), strict=True) if row.names == trial.hidden]
     row |= {
-        "likely": sum(of_truth), "asked": found.asked, "design": choice.design.kind, "band": choice.design.place,
+        "asked": found.asked, "design": choice.design.kind, "band": choice.design.place,
         "level": choice.design.level, "length": choice.design.length / limits.length,
         "sensor": "" if choice.sensor is None else str(choice.sensor), "promise": choice.promise,
         "promise_as_was": math.nan if again is None else again.promise,
