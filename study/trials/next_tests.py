@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from study.diagnose.confirmed_faults import diagnose_accounted
-from study.diagnose.next_test import Choice, driving, next_test, tied_rows
+from study.diagnose.next_test import WORTH, Choice, driving, next_test, tied_rows
 from study.diagnose.separation import Rivals, allowed, own_limits, rivals_of
 from study.equations.free_run import prepare
 from study.records.interpolation import between_samples
@@ -40,6 +40,8 @@ def judged_next_test(trial: Trial, seed: int) -> Row:
         "sensor": "" if choice.sensor is None else str(choice.sensor), "promise": choice.promise,
         "promise_as_was": math.nan if again is None else again.promise,
     }  # fmt: skip
+    if choice.promise < WORTH:  # it is said that no test is likely to decide
+        return row
     row["decided"], row["ends_in"] = _decided(trial, rivals, choice, np.random.default_rng([seed, 1]))
     every, rng = allowed(rivals.fits, rivals.present, limits, choice.design.length), np.random.default_rng([seed, 2])
     drawn = every[int(rng.integers(len(every)))]

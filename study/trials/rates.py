@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from study.diagnose.next_test import WORTH
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.trials.draw import NOISES
@@ -280,14 +281,16 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             Reach("ties that end in the right effect, where 95 % or more was promised", _promised(0.95), _is("decided"),
                   "sure"),
             Reach("... where 80 to 95 % was promised", _promised(0.8, 0.95), _is("decided"), "likely"),
-            Reach("... where less was promised", _promised(0.0, 0.8), _is("decided")),
-            Reach("... after a random test that is allowed and as long, where 80 % or more was promised of the other",
+            Reach("... where less was promised", _promised(WORTH, 0.8), _is("decided")),
+            Reach("... where 80 % or more was promised, after a random test that is allowed and as long",
                   _promised(0.8), _is("random_decided")),
-            Reach("all ties, after the proposed test", _promised(0.0), _is("decided")),
-            Reach("all ties, after a random test", _promised(0.0), _is("random_decided")),
+            Reach("all ties for which a test is proposed, after that", _promised(WORTH), _is("decided")),
+            Reach("... after a random test that is allowed and as long", _promised(WORTH), _is("random_decided")),
+            Reach("ties of which it is said that no allowed test is likely to decide", _promised(0.0),
+                  lambda r: float(r["promise"] < WORTH)),
             Reach("mean size of the promise, where 80 to 95 % was promised", _promised(0.8, 0.95), _number("promise"),
                   size=True),
-            Reach("mean size of the promise, where less was promised", _promised(0.0, 0.8), _number("promise"),
+            Reach("mean size of the promise, where less was promised", _promised(WORTH, 0.8), _number("promise"),
                   size=True),
         ),
     }
