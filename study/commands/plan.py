@@ -68,7 +68,8 @@ def _run(arguments: argparse.Namespace) -> None:
         if arguments.precision:
             fit = (diagnosis.answer or diagnosis.comparison).fit
             step("comparing tests")
-            words, files = precise_plan(precise_test(fit, diagnosis.comparison.prepared, *arguments.precision, asked))
+            key, wanted = arguments.precision
+            words, files = precise_plan(precise_test(fit, diagnosis.comparison.prepared, key, wanted, asked))
         else:
             rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
             limits = limits_asked(rivals.fits, rivals.present, *asked)

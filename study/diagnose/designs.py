@@ -12,6 +12,7 @@ import numpy as np
 from study.equations.linear_part import acting, matrices
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.completion import derivative
+from study.records.driven_by_motion import SAID
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 from study.records.prepared import FORCE, Prepared
@@ -163,14 +164,15 @@ def _power(values: Floats) -> Floats:
     """Power by line of channels, each in shares of its own and smoothed over some lines, shape (lines,)."""
     lines = np.abs(np.fft.rfft(values - np.mean(values, axis=0), axis=0)) ** 2
     total = np.sum(lines, axis=0)
-    power = np.sum(lines / np.where(total > 0.0, total, 1.0), axis=1)
-    return np.convolve(power, np.ones(9), "same")
+    power: Floats = np.sum(lines / np.where(total > 0.0, total, 1.0), axis=1)
+    return np.asarray(np.convolve(power, np.ones(9), "same"), dtype=np.float64)
 
 
 def _deflection(prepared: Prepared, fit: FreeRunFit, drivers: tuple[str, ...], peaks: Floats) -> Floats:
     """Of a decay the state that it began with; else what its largest forces hold, by the linear springs."""
     model, record = fit.model, prepared.record
-    if prepared.response == FORCE or model.modal or OF_THE_GROUND in record.forces:
+    based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
+    if prepared.response == FORCE or model.modal or based:  # nothing pulls at what stands on a table
         return np.zeros(0)
     if prepared.free:
         source, first = (record.stretches[0].source, record.stretches[0].first) if record.stretches else (record, 0)
@@ -179,8 +181,8 @@ def _deflection(prepared: Prepared, fit: FreeRunFit, drivers: tuple[str, ...], p
     if float(np.min(np.linalg.eigvalsh(stiffness))) <= 0.0:
         return np.zeros(0)
     largest = np.array([dict(zip(drivers, peaks.tolist(), strict=True)).get(name, 0.0) for name, _ in model.forces])
-    held = np.linalg.solve(stiffness, acting(model) @ largest)
-    return np.concatenate([held, np.zeros(len(held))])
+    held = np.asarray(np.linalg.solve(stiffness, acting(model) @ largest), dtype=np.float64)
+    return np.concatenate([held, np.zeros(len(stiffness))])
 
 
 def possible_designs(
@@ -199,21 +201,29 @@ def possible_designs(
         except StudyError:  # a band without a line, a channel that only the record has
             continue
         levels = [share * loudest for share in shares if share > 0.3 or share * loudest >= 1.0]
-        levels += [1.0] if kind == AS_WAS and loudest >= 1.0 else []
+        if kind == present.kinds[0][0] and reached(make(1.0)) <= 1.0 and _driven_within(make(1.0), present, limits):
+            levels.append(1.0)
         yield from (make(level) for level in levels if level > 0.0)
+
+
+def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:
+    """Whether the forces of a test are within their limit; where no force drives it, they are."""
+    return present.prescribed or all(float(np.max(np.abs(design.record[f]))) <= limits.force for f in present.drivers)
 
 
 def _loudest(
     make: Callable[[float], Design], present: PresentTest, limits: Limits, reached: Callable[[Design], float]
 ) -> float:
-    """The largest level of a kind of test within the limits; zero if none is found."""
-    forced = bool(present.drivers) and not present.prescribed
-    level = limits.force / float(np.max(present.peaks)) if forced else 1.0
-    if not forced:  # as far as the motion alone allows, which the first look says
-        level = 1.0 / max(reached(make(1e-3)), 1e-9) * 1e-3
+    """The largest level of a kind of test within the limits, about; zero if none is found."""
+    if present.drivers:
+        level = (limits.displacement if present.prescribed else limits.force) / float(np.max(present.peaks))
+    else:
+        level = limits.displacement / float(np.max(np.abs(present.deflection[: present.coordinates])))
+    above = np.inf
     for _ in range(12):
         share = reached(make(level))
         if share <= 1.0:
-            return level
-        level *= max(0.95 / share, 0.3)
+            middle = 0.5 * (level + above)
+            return middle if np.isfinite(above) and reached(make(middle)) <= 1.0 else level
+        above, level = level, level * max(0.95 / share, 0.5)
     return 0.0

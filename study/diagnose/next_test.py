@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from study.compare.prediction import predict
-from study.diagnose.designs import AS_WAS, LET_GO, Design, Limits, PresentTest
+from study.diagnose.designs import LET_GO, Design, Limits, PresentTest
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked
 from study.diagnose.separation import Rivals, allowed, own_limits, respond, rivals_of, shortened
@@ -107,7 +107,7 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: 
     fits, present = rivals.fits, rivals.present
     screened = (_screened(rivals, design) for design in allowed(fits, present, limits))
     found = [choice for choice in screened if choice is not None]
-    again = next((c for c in found if c.design.kind == AS_WAS and c.design.level == 1.0), None)
+    again = next((c for c in found if c.design.kind == present.kinds[0][0] and c.design.level == 1.0), None)
     asked = len(found)
     found.sort(key=lambda choice: choice.merit, reverse=True)
     good = [choice for choice in found if choice.promise >= DECIDES]

@@ -59,7 +59,7 @@ def driving_panel(axes: Axes, found: NextTest) -> Axes:
     values = record.columns(names)
     factor, unit = _easy(present.source.unit(names[0]), values)
     for own, look in zip(values.T, LOOKS, strict=False):
-        axes.plot(record.dt * np.arange(len(record)), own / factor, **{**look, "linewidth": 0.7})
+        axes.plot(record.dt * np.arange(len(record)), own / factor, linewidth=0.7, color=look["color"])
     axes.set_ylabel(f"{' and '.join(names)} ({unit})")
     axes.set_xlabel("time (s)")
     return axes
@@ -70,9 +70,10 @@ def answers_panel(axes: Axes, found: NextTest) -> Axes:
     rivals, design = found.rivals, found.choice.design
     sensors = rivals.seen(found.choice.sensor)[0].sensors
     answers = np.stack([respond(fit, design, sensors)[0] for fit in rivals.fits])
-    apart = np.max(answers, axis=0) - np.min(answers, axis=0)
+    apart: Floats = np.max(answers, axis=0) - np.min(answers, axis=0)
     noise = found.rivals.noise_of(found.choice.sensor)
-    most = int(np.argmax([np.mean(apart[:, i] ** 2) / noise[s] ** 2 for i, s in enumerate(sensors)]))
+    sizes = [float(np.mean(apart[:, i] ** 2)) / noise[s] ** 2 for i, s in enumerate(sensors)]
+    most = int(np.argmax(sizes))
     sensor, samples = (
         sensors[most],
         min(len(apart), max(32, round(6.0 / (rivals.present.resonance * design.record.dt)))),

@@ -25,8 +25,7 @@ from study.support.numbers import enumerated, percent
 
 def rival_in_words(row: Ranked, rows: Sequence[Ranked]) -> str:
     """What a rival has that not all of them have, in words."""
-    common = set.intersection(*(set(r.names) for r in rows))
-    own = [effect_in_words(e) for e in row.entries if e.name not in common]
+    own = [effect_in_words(e) for e in row.entries if not all(e.name in r.names for r in rows)]
     return enumerated(own) if own else "none beside them"
 
 

@@ -1,14 +1,14 @@
 """Which test tells a value as closely as is wanted: by the information that it adds to what a record tells.
 
 With J the sensitivities of a fitted model in a test, white, and C the covariance of its coefficients, that of both
-together is ``(C^-1 + J' J)^-1``, states at the first sample beside.
+together is ``(C^-1 + J' J / 2)^-1``, states at the first sample beside: a half of what is measured is fitted, the other judged.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from study.diagnose.designs import AS_WAS, Design, Limits, PresentTest, present_test
+from study.diagnose.designs import Design, Limits, PresentTest, present_test
 from study.diagnose.separation import allowed, known_of, limits_asked, respond, root_of_inverse, shortened
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.weighted_fit import noise_left
@@ -64,12 +64,12 @@ def precise_test(
             return np.inf
         columns = prepared.outputs.whitened(prepared.outputs.stacked(jacobian), noise) / size
         rows = np.zeros((len(known) + len(columns), columns.shape[1]))
-        rows[: len(known), : known.shape[1]], rows[len(known) :] = known, columns
+        rows[: len(known), : known.shape[1]], rows[len(known) :] = known, columns / np.sqrt(2.0)
         return _half_width(rows, at) / abs(value)
 
     designs = allowed((fit,), present, limits)
     found = sorted(((width(d), d) for d in designs), key=lambda pair: pair[0])
-    again = min((w for w, d in found if d.kind == AS_WAS and d.level == 1.0), default=np.nan)
+    again = min((w for w, d in found if d.kind == present.kinds[0][0] and d.level == 1.0), default=np.nan)
     good = [pair for pair in found if pair[0] <= wanted]
     shorter = [(width(d), d) for _, one in good[:12] for d in shortened((fit,), present, limits, one)]
     enough = [*good, *(pair for pair in shorter if pair[0] <= wanted)]

@@ -130,10 +130,10 @@ class Rivals:
         if further is None:
             return outputs, self.noise
         noise = self.noise or ((np.ones(1),) * len(outputs))
-        share = np.mean(np.std(outputs.apart(self.rows[0].residual), axis=0) / np.std(motions, axis=0))
+        share: Floats = np.std(outputs.apart(self.rows[0].residual), axis=0) / np.std(motions, axis=0)
         moved = float(np.std(self.rows[0].prediction.motions([further])))
         kept = [i for i, s in enumerate(outputs.sensors) if s.coordinate != further.coordinate]
-        own = np.array([self.size / (float(share) * moved)])
+        own = np.array([self.size / (float(np.mean(share)) * moved)])
         weights = (*(outputs.weights[i] for i in kept), 1.0)
         return Outputs((*(outputs.sensors[i] for i in kept), further), weights), (*(noise[i] for i in kept), own)
 

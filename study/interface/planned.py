@@ -1,13 +1,26 @@
 """Which test next: what is planned of a diagnosis, as a notebook has it."""
 
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.diagnose.next_test import NextTest, driving
-from study.diagnose.next_test_report import deciding_plan, next_test_in_words, pair_table, precise_plan
-from study.diagnose.precision import PreciseTest
+from study.diagnose.next_test import NextTest, driving, next_test, tied_rows
+from study.diagnose.next_test_report import (
+    deciding_plan,
+    next_test_in_words,
+    pair_table,
+    precise_plan,
+    precise_test_in_words,
+)
+from study.diagnose.precision import PreciseTest, precise_test
+from study.diagnose.separation import limits_asked, rivals_of
+from study.diagnose.verdict import Diagnosis
 from study.interface.showing import Words, drawing_axes
+from study.support.errors import expect
 from study.support.files import write_files
 
 if TYPE_CHECKING:
@@ -87,6 +100,16 @@ class PlannedTest:
         return f"<PlannedTest: {self.says}>"
 
 
-def planned(found: NextTest) -> PlannedTest:
-    """A test that decides, for a notebook."""
-    return PlannedTest(found, Words(next_test_in_words(found)))
+def planned(
+    diagnosis: Diagnosis, limits: tuple[float | None, float | None, float | None], precision: Mapping[str, float] | None
+) -> PlannedTest:
+    """What :meth:`Diagnosis.plan` does; its arguments."""
+    prepared = diagnosis.comparison.prepared
+    if precision:
+        expect(len(precision) == 1, f"precision names {', '.join(precision)}; expected one value and a share of it")
+        ((key, wanted),) = precision.items()
+        found = precise_test((diagnosis.answer or diagnosis.comparison).fit, prepared, key, wanted, limits)
+        return PlannedTest(found, Words(precise_test_in_words(found)))
+    rivals = rivals_of(tied_rows(diagnosis), prepared)
+    decides = next_test(rivals, limits_asked(rivals.fits, rivals.present, *limits))
+    return PlannedTest(decides, Words(next_test_in_words(decides)))
