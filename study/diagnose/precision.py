@@ -1,7 +1,8 @@
 """Which test tells a value as closely as is wanted: by the information that it adds to what a record tells.
 
 With J the sensitivities of a fitted model in a test, white, and C the covariance of its coefficients, that of both
-together is ``(C^-1 + J' J / 2)^-1``, states at the first sample beside: a half of what is measured is fitted, the other judged.
+together is ``(C^-1 + J' J / 2)^-1``, states at the first sample beside: a half of what is measured is fitted, the
+other judged.
 """
 
 from dataclasses import dataclass
