@@ -62,7 +62,7 @@ estimators: $(READY)
 	$(BIN)/snakemake -j2 estimators
 	$(BIN)/python scripts/estimator_docs.py
 
-# TABLE: trials, trials_by_test, trials_of_structures or trials_like_rigs.
+# TABLE: trials, trials_by_test, trials_of_structures, trials_like_rigs or trials_of_next_tests.
 TABLE = trials
 trials: $(READY)
 	$(BIN)/snakemake -j2 $(TABLE)

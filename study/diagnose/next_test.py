@@ -18,7 +18,7 @@ from study.compare.prediction import predict
 from study.diagnose.designs import LET_GO, Design, Limits, PresentTest
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked
-from study.diagnose.separation import Rivals, allowed, own_limits, respond, rivals_of, shortened
+from study.diagnose.separation import Rivals, allowed, own_limits, respond, rivals_of, shorter_designs
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import free
 from study.identify.time_domain.fit_model import with_term
@@ -113,7 +113,7 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: 
     good = [choice for choice in found if choice.promise >= DECIDES]
     if good:
         progress("comparing shorter tests")
-        tried = [d for one in good[:12] for d in shortened(fits, present, limits, one.design)]
+        tried = [d for one in good[:12] for d in shorter_designs(fits, present, limits, one.design)]
         asked += len(tried)
         shorter = [c for d in tried if (c := _screened(rivals, d)) is not None and c.promise >= DECIDES]
         cheap = min([*good, *shorter], key=lambda choice: choice.design.effort)

@@ -22,7 +22,7 @@ from study.support.arrays import Floats
 from study.support.numbers import percent
 from study.support.thresholds import K
 
-LOOKS: tuple[dict[str, Any], ...] = (
+RIVAL_LOOKS: tuple[dict[str, Any], ...] = (
     {"linestyle": "-", "color": "C0", "linewidth": 2.2}, {"linestyle": "--", "color": "C1", "linewidth": 1.6},
     {"linestyle": ":", "color": "C2", "linewidth": 2.0}, {"linestyle": "-.", "color": "C3", "linewidth": 1.5},
     {"linestyle": (0, (6, 1, 1, 1, 1, 1)), "color": "0.3", "linewidth": 1.3},
@@ -58,7 +58,7 @@ def driving_panel(axes: Axes, found: NextTest) -> Axes:
     names = present.drivers or present.source.forces
     values = record.columns(names)
     factor, unit = _easy(present.source.unit(names[0]), values)
-    for own, look in zip(values.T, LOOKS, strict=False):
+    for own, look in zip(values.T, RIVAL_LOOKS, strict=False):
         axes.plot(record.dt * np.arange(len(record)), own / factor, linewidth=0.7, color=look["color"])
     axes.set_ylabel(f"{' and '.join(names)} ({unit})")
     axes.set_xlabel("time (s)")
@@ -82,7 +82,7 @@ def answers_panel(axes: Axes, found: NextTest) -> Axes:
     shown = answers[:, :, most]
     factor, unit = _easy(rivals.prepared.record.unit(sensor), shown[:, at : at + samples])
     time = design.record.dt * np.arange(at, at + samples, 0.125)[: 8 * (samples - 1) + 1]
-    for row, own, look in zip(rivals.rows, shown, LOOKS, strict=False):
+    for row, own, look in zip(rivals.rows, shown, RIVAL_LOOKS, strict=False):
         smooth = between_samples(own, 8)[8 * at : 8 * (at + samples - 1) + 1]
         axes.plot(time, smooth / factor, label=rival_in_words(row, rivals.rows), **look)
     axes.set_ylabel(f"{sensor} ({unit})")
@@ -95,7 +95,7 @@ def evidence_panel(axes: Axes, found: NextTest) -> Axes:
     rivals, choice = found.rivals, found.choice
     outputs, noise = rivals.seen(choice.sensor)
     time = choice.design.record.dt * np.arange(len(choice.design.record))
-    for j, look in list(enumerate(LOOKS))[1 : len(rivals.rows)]:
+    for j, look in list(enumerate(RIVAL_LOOKS))[1 : len(rivals.rows)]:
         left = outputs.whitened(outputs.stacked(rivals.left(choice.design, 0, j, choice.sensor)), noise) / rivals.size
         power = np.sum(left.reshape(len(time), -1) ** 2, axis=1)
         axes.plot(time, np.cumsum(power), **look)

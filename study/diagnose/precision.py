@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.diagnose.designs import Design, Limits, PresentTest, present_test
-from study.diagnose.separation import allowed, known_of, limits_asked, respond, root_of_inverse, shortened
+from study.diagnose.separation import allowed, known_of, limits_asked, respond, root_of_inverse, shorter_designs
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import Prepared
@@ -72,7 +72,7 @@ def precise_test(
     found = sorted(((width(d), d) for d in designs), key=lambda pair: pair[0])
     again = min((w for w, d in found if d.kind == present.kinds[0][0] and d.level == 1.0), default=np.nan)
     good = [pair for pair in found if pair[0] <= wanted]
-    shorter = [(width(d), d) for _, one in good[:12] for d in shortened((fit,), present, limits, one)]
+    shorter = [(width(d), d) for _, one in good[:12] for d in shorter_designs((fit,), present, limits, one)]
     enough = [*good, *(pair for pair in shorter if pair[0] <= wanted)]
     best = min(enough, key=lambda pair: pair[1].effort) if enough else found[0]
     expect(np.isfinite(best[0]), f"no test within the limits tells {key} of {model!r}; expected wider limits")

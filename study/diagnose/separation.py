@@ -188,7 +188,7 @@ def respond(
     return shown, derivatives
 
 
-def reached(fits: Sequence[FreeRunFit], present: PresentTest, design: Design, limits: Limits) -> float:
+def limit_share(fits: Sequence[FreeRunFit], present: PresentTest, design: Design, limits: Limits) -> float:
     """Largest displacement, and force on a component, over the limits, whichever model is true; infinite if endless."""
     sensors = [Sensor(c, MOTIONS[0]) for c in fits[0].model.coordinates]
     sensors = [Sensor(ALONE, FORCE)] if present.prescribed else sensors
@@ -207,10 +207,12 @@ def own_limits(fits: Sequence[FreeRunFit], present: PresentTest, times: float = 
     length = len(present.source) * present.source.dt
     kind, place = present.kinds[0]
     driven = float(np.max(present.peaks, initial=0.0)) or 1.0
-    answered = reached(
+    answered = limit_share(
         fits, present, present.design(kind, place, len(present.source), 1.0), Limits(1.0, np.inf, length)
     )
-    moved = reached(fits, present, present.design(kind, place, len(present.source), 1.0), Limits(np.inf, 1.0, length))
+    moved = limit_share(
+        fits, present, present.design(kind, place, len(present.source), 1.0), Limits(np.inf, 1.0, length)
+    )
     return (
         Limits(times * answered, times * driven, length)
         if present.prescribed
@@ -245,7 +247,9 @@ def allowed(
     )
     most = replace(limits, length=min(length or limits.length, 8192 * present.source.dt))
     found = list(
-        possible_designs(present, most, lambda d: reached(fits, present, d, limits), (1.0, 0.6, 0.35, 0.2, 0.1, 0.05))
+        possible_designs(
+            present, most, lambda d: limit_share(fits, present, d, limits), (1.0, 0.6, 0.35, 0.2, 0.1, 0.05)
+        )
     )
     expect(
         found,
@@ -256,7 +260,9 @@ def allowed(
     return found
 
 
-def shortened(fits: Sequence[FreeRunFit], present: PresentTest, limits: Limits, design: Design) -> Iterator[Design]:
+def shorter_designs(
+    fits: Sequence[FreeRunFit], present: PresentTest, limits: Limits, design: Design
+) -> Iterator[Design]:
     """The same kind of test in a half and in a quarter of the time, where the limits allow that."""
     for part in (2, 4):
         samples = len(design.record) // part
@@ -266,7 +272,7 @@ def shortened(fits: Sequence[FreeRunFit], present: PresentTest, limits: Limits, 
             shorter = present.design(design.kind, design.place, samples, design.level)
         except StudyError:  # a band without a line
             return
-        if reached(fits, present, shorter, limits) <= 1.0:
+        if limit_share(fits, present, shorter, limits) <= 1.0:
             yield shorter
 
 

@@ -8,7 +8,7 @@ again), one effect hidden and taken out of the library (``removed``), and one ef
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
@@ -125,9 +125,20 @@ def rig_orders(first: int = 780_001, each: int = 26) -> list[Order]:
     return [Order("", first + i, None, None, None, test=kinds[i % len(kinds)]) for i in range(each * len(kinds))]
 
 
-def next_test_orders(each: int = 24) -> list[Order]:
-    """The first of each kind of test, for a test that is to end the tie where there is one."""
-    return [replace(order, kind=PLANNED) for order in orders_of_tests(each=each)]
+def next_test_orders(count: int = 120, first: int = 640_001) -> list[Order]:
+    """So many trials of tests whose ties are of equals, for a test that is to end them: a damper is hidden.
+
+    Where one effect is the limit of another, as a steady force of a soft contact, no test ends a tie.
+    """
+    tests, dampers = ("base", "blows", "free_decay"), [name for name in HIDDEN if name.endswith("_damping")]
+    noises = FAMILIES[tests[0]].noises[1:]
+    return [
+        Order(
+            PLANNED, first + i, (dampers[(i // len(tests)) % len(dampers)],), noises[i % len(noises)], None,
+            test=tests[i % len(tests)],
+        )
+        for i in range(count)
+    ]  # fmt: skip
 
 
 def run_trial(order: Order) -> Row:

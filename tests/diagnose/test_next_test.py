@@ -14,7 +14,7 @@ from study.diagnose.designs import AS_WAS, LET_GO, MULTISINE, SWEEP, Limits
 from study.diagnose.next_test import DECIDES, Choice, driving, next_test, rehearsed, simulated, tied_rows
 from study.diagnose.next_test_report import as_wav, deciding_plan, next_test_in_words, precise_plan
 from study.diagnose.precision import precise_test
-from study.diagnose.separation import allowed, own_limits, reached, respond, rivals_of, root_of_inverse
+from study.diagnose.separation import allowed, limit_share, own_limits, respond, rivals_of, root_of_inverse
 from study.diagnose.verdict import diagnose
 from study.equations.terms import LIBRARY
 from study.identify.time_domain.part_fit import fit_part
@@ -210,7 +210,7 @@ def test_the_diagnosis_names_the_test(diagnosis):
     found = following.suggested(diagnosis)
     assert found is not None
     assert found is following.suggested(diagnosis), "it is found once"
-    assert reached(found.rivals.fits, found.rivals.present, found.choice.design, found.limits) <= 1.0
+    assert limit_share(found.rivals.fits, found.rivals.present, found.choice.design, found.limits) <= 1.0
 
 
 def test_the_command_writes_the_plan(trial, tmp_path, capsys):
