@@ -73,6 +73,12 @@ class PresentTest:
     resonance: float  # in hertz: where the response has most of its power
     deflection: Floats  # state that it can be let go from, shape (2 coordinates,); empty where it cannot
     coordinates: int
+    based: bool  # whether the base moves, whose acceleration stands for the force
+
+    @property
+    def driven_by(self) -> str:
+        """What is limited of it, in a word."""
+        return "stroke" if self.prescribed else "acceleration" if self.based else "force"
 
     @property
     def prescribed(self) -> bool:
@@ -157,8 +163,9 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     }  # fmt: skip
     most = 0.4 / source.dt
     bands = {name: (a, min(b, most)) for name, (a, b) in bands.items() if a < 0.8 * most}
-    deflection = _deflection(prepared, fit, drivers, peaks)
-    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates))
+    based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
+    deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table
+    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based)
 
 
 def _power(values: Floats) -> Floats:
@@ -172,8 +179,7 @@ def _power(values: Floats) -> Floats:
 def _deflection(prepared: Prepared, fit: FreeRunFit, drivers: tuple[str, ...], peaks: Floats) -> Floats:
     """Of a decay the state that it began with; else what its largest forces hold, by the linear springs."""
     model, record = fit.model, prepared.record
-    based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
-    if prepared.response == FORCE or model.modal or based:  # nothing pulls at what stands on a table
+    if prepared.response == FORCE or model.modal:
         return np.zeros(0)
     if prepared.free:
         source, first = (record.stretches[0].source, record.stretches[0].first) if record.stretches else (record, 0)

@@ -27,7 +27,6 @@ from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.settling import better_fit
 from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import noise_left
-from study.records.driven_by_motion import SAID
 from study.records.interpolation import between_samples
 from study.records.outputs import Noise
 from study.records.prepared import FORCE, Prepared
@@ -284,7 +283,7 @@ def driving(present: PresentTest, design: Design, prepared: Prepared, mass: floa
     """
     names = present.drivers if design.kind != LET_GO else ()
     fine = {name: between_samples(design.record[name], prepared.every) for name in names}
-    if FORCE in fine and any(note.startswith(SAID) for note in prepared.notes):
+    if FORCE in fine and present.based:
         return {OF_THE_GROUND: -fine[FORCE] / (mass or 1.0)}
     return fine
 

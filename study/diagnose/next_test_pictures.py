@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.special import ndtri
 
+from study.diagnose.designs import LET_GO
 from study.diagnose.next_test import DECIDES, NextTest
-from study.diagnose.next_test_report import next_test_in_words, rival_in_words
+from study.diagnose.next_test_report import design_in_words, rival_in_words
 from study.diagnose.separation import respond
 from study.equations.dimensions import pretty
 from study.figures import page
@@ -26,6 +27,7 @@ RIVAL_LOOKS: tuple[dict[str, Any], ...] = (
     {"linestyle": "-", "color": "C0", "linewidth": 2.2}, {"linestyle": "--", "color": "C1", "linewidth": 1.6},
     {"linestyle": ":", "color": "C2", "linewidth": 2.0}, {"linestyle": "-.", "color": "C3", "linewidth": 1.5},
     {"linestyle": (0, (6, 1, 1, 1, 1, 1)), "color": "0.3", "linewidth": 1.3},
+    {"linestyle": (0, (1, 3)), "color": "C5", "linewidth": 2.4},
 )  # fmt: skip
 
 
@@ -37,30 +39,32 @@ def next_test_pictures(found: NextTest) -> dict[str, bytes]:
 
 def next_test_figure(found: NextTest) -> Figure:
     """What drives the test, what each rival answers where they differ most, and what no coefficient makes up for."""
-    words = next_test_in_words(found).partition(" decides")[0]
+    words = design_in_words(found.choice.design, found.rivals.present)
     first = rival_in_words(found.rivals.rows[0], found.rivals.rows)
+    panels = {
+        "what drives it": driving_panel, "what each would answer, where they differ most": answers_panel,
+        f"evidence against each other if {first} is true": evidence_panel,
+    }  # fmt: skip
+    drawn = list(panels.items())[1 if found.choice.design.kind == LET_GO else 0 :]
     figure, axes = page.empty_page(
-        f"Which test next? {found.rivals.prepared.record.name}", words, rows=3, panel=1.7,
-        legend_rows=page.rows_for(len(found.rivals.rows)), share=False, width=7.6,
+        f"Which test next? {found.rivals.prepared.record.name}", words, rows=len(drawn), panel=1.7,
+        legend_rows=-(-len(found.rivals.rows) // 3), share=False, width=7.8,
     )  # fmt: skip
-    driving_panel(axes[0], found)
-    answers_panel(axes[1], found)
-    evidence_panel(axes[2], found)
-    evidence = f"evidence against each other if {first} is true"
-    page.letter(axes, ["what drives it", "what each would answer, where they differ most", evidence])
-    page.shared_legend(figure, axes[1:2])
+    for own, (_, draw) in zip(axes, drawn, strict=True):
+        draw(own, found)
+    page.letter(axes, [name for name, _ in drawn])
+    page.shared_legend(figure, axes[-2:-1], 3)
     return figure
 
 
 def driving_panel(axes: Axes, found: NextTest) -> Axes:
     """What drives the test along time."""
     record, present = found.choice.design.record, found.rivals.present
-    names = present.drivers or present.source.forces
-    values = record.columns(names)
-    factor, unit = _easy(present.source.unit(names[0]), values)
+    values = record.columns(present.drivers)
+    factor, unit = _easy(present.source.unit(present.drivers[0]), values)
     for own, look in zip(values.T, RIVAL_LOOKS, strict=False):
         axes.plot(record.dt * np.arange(len(record)), own / factor, linewidth=0.7, color=look["color"])
-    axes.set_ylabel(f"{' and '.join(names)} ({unit})")
+    axes.set_ylabel(f"{'displacement' if present.prescribed else present.driven_by} ({unit})")
     axes.set_xlabel("time (s)")
     return axes
 
@@ -98,14 +102,15 @@ def evidence_panel(axes: Axes, found: NextTest) -> Axes:
     for j, look in list(enumerate(RIVAL_LOOKS))[1 : len(rivals.rows)]:
         left = outputs.whitened(outputs.stacked(rivals.left(choice.design, 0, j, choice.sensor)), noise) / rivals.size
         power = np.sum(left.reshape(len(time), -1) ** 2, axis=1)
-        axes.plot(time, np.cumsum(power), **look)
+        axes.semilogy(time, np.maximum(np.cumsum(power), 0.1), **look)
     needed = (2.0 * (K + float(ndtri(DECIDES)))) ** 2
     axes.axhline(needed, color="0.35", linewidth=0.9)
     axes.annotate(
-        f"decides with {percent(DECIDES, '.0f')}", (0.01, needed), xycoords=("axes fraction", "data"),
-        xytext=(0, 2), textcoords="offset points", va="bottom", fontsize=8,
+        f"decides with {percent(DECIDES, '.0f')}", (1.0, needed), xycoords=("axes fraction", "data"),
+        xytext=(0, 2), textcoords="offset points", ha="right", va="bottom", fontsize=8,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
     )  # fmt: skip
-    axes.set_ylim(0.0, max(1.25 * needed, min(axes.get_ylim()[1], 6.0 * needed)))
+    axes.set_ylim(1.0, max(10.0 * needed, axes.get_ylim()[1]))
     axes.set_ylabel("evidence")
     axes.set_xlabel("time (s)")
     return axes

@@ -34,7 +34,7 @@ def next_test_in_words(found: NextTest) -> str:
     rows, choice = found.rivals.rows, found.choice
     names = enumerated([rival_in_words(row, rows) for row in rows])
     test = design_in_words(choice.design, found.rivals.present)
-    needs = "" if choice.sensor is None else f", with a sensor of {_sensor_in_words(choice.sensor)},"
+    needs = "" if choice.sensor is None else f", with {_sensor_in_words(choice.sensor)} measured,"
     words = [f"{test[0].upper()}{test[1:]}{needs} decides between {names} with {_sure(choice.promise)}"]
     again = None if found.again is None or _same(found.again, choice) else found.again
     words[0] += "." if again is None else f"; as was, {_sure(again.promise)}."
@@ -48,7 +48,10 @@ def next_test_in_words(found: NextTest) -> str:
         if level:
             words.append(f"It would not tell, if the first is true, {enumerated(level)}.")
     if choice.sensor is not None:
-        words.append("Diagnose its record by itself: this one has no such sensor.")
+        words.append(
+            "That counts on noise in the same proportion to the motion as now; diagnose its record by itself "
+            f"(--response {choice.sensor.motion}), as this one has no such sensor."
+        )
     return " ".join(words)
 
 
@@ -62,7 +65,7 @@ def advice_in_words(found: NextTest | None) -> str:
             f"Of {found.asked} tests {within} none is likely to decide between them; 'study plan' takes other limits."
         )
     test = design_in_words(found.choice.design, found.rivals.present)
-    needs = "" if found.choice.sensor is None else f" with a sensor of {_sensor_in_words(found.choice.sensor)}"
+    needs = "" if found.choice.sensor is None else f", with {_sensor_in_words(found.choice.sensor)} measured"
     return (
         f"The test that is most likely to decide between them {within}: {test}{needs}; 'study plan' rehearses it, says "
         "how sure it is, and writes its force."
@@ -88,11 +91,10 @@ def design_in_words(design: Design, present: PresentTest) -> str:
     record = design.record
     if design.kind == LET_GO:
         return f"{_let_go(design, present)}, {design.length:.3g} s"
-    what = "stroke" if present.prescribed else "force"
     loudest = max(present.drivers, key=lambda d: float(np.max(np.abs(record[d]))))
     peak = _quantity(float(np.max(np.abs(record[loudest]))), record.unit(loudest))
     times = "the same" if design.level == 1.0 else f"{design.level:.2g} times the"
-    level = f"at {times} level (largest {what} {peak})"
+    level = f"at {times} level (largest {present.driven_by} {peak})"
     match design.kind:
         case _ if design.kind == AS_WAS:
             words = f"the same {'motion' if present.prescribed else 'force'}"
