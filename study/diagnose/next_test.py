@@ -94,8 +94,8 @@ def tied_rows(diagnosis: Diagnosis, most: int = 6) -> tuple[Ranked, ...]:
 def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: Doing = lambda _: None) -> NextTest:
     """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
 
-    Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet. Of the tests that
-    promise most up to three are rehearsed, so many times with each rival true.
+    Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet. Up to three tests
+    are rehearsed, so many times with each rival true: the cheapest first, then one that is dearer, then the surest.
 
     Raises
     ------
@@ -112,25 +112,25 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: 
     good = [choice for choice in found if choice.promise >= DECIDES]
     if good:
         progress("comparing shorter tests")
-        tried = [d for one in good[:12] for d in shorter_designs(fits, present, limits, one.design)]
+        tried = [d for one in good for d in shorter_designs(fits, present, limits, one.design)]
         asked += len(tried)
         shorter = [c for d in tried if (c := _screened(rivals, d)) is not None and c.promise >= DECIDES]
-        cheap = min([*good, *shorter], key=lambda choice: choice.design.effort)
-        found = [cheap, *(choice for choice in found if choice is not cheap)]
+        listed = sorted([*good, *shorter], key=lambda choice: choice.design.effort)
+        heard = [listed[0], listed[len(listed) // 2], found[0]]
     else:
         further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in further_sensors(rivals)]
         asked += len(further)
         every = [*found, *(choice for choice in further if choice is not None)]
-        found = sorted(every, key=lambda choice: choice.merit, reverse=True)
-    best = found[0]
+        heard = list(islice(_different(sorted(every, key=lambda choice: choice.merit, reverse=True)), 3))
+    best = heard[0]
     if rehearsals and best.promise >= WORTH:
-        heard = list[Choice]()
-        for choice in (found[0], *islice(_different(found[1:]), 2)):
+        tested = list[Choice]()
+        for choice in heard:
             progress(f"rehearsing the {choice.design.kind}")
-            heard.append(rehearsed(rivals, choice, rehearsals))
-            if heard[-1].promise >= DECIDES:
+            tested.append(rehearsed(rivals, choice, rehearsals))
+            if tested[-1].promise >= DECIDES:
                 break
-        best = max(heard, key=lambda choice: choice.merit)
+        best = max(tested, key=lambda choice: choice.merit)
         again = rehearsed(rivals, again, rehearsals) if again and again.promise >= WORTH else again
     return NextTest(rivals, limits, best, again, asked)
 
