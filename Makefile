@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures next_test notebooks docs gallery readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -42,6 +42,9 @@ picture: $(READY)
 
 fault_pictures: $(READY)
 	$(BIN)/python scripts/fault_pictures.py models docs/faults
+
+next_test: $(READY)
+	$(BIN)/python scripts/next_test_docs.py docs
 
 notebooks: $(READY)
 	$(BIN)/python scripts/notebooks.py docs/notebooks/*.ipynb

@@ -34,8 +34,8 @@ def next_test_in_words(found: NextTest) -> str:
     rows, choice = found.rivals.rows, found.choice
     names = enumerated([rival_in_words(row, rows) for row in rows])
     test = design_in_words(choice.design, found.rivals.present)
-    needs = "" if choice.sensor is None else f", with {_sensor_in_words(choice.sensor)} measured,"
-    words = [f"{test[0].upper()}{test[1:]}{needs} decides between {names} with {_sure(choice.promise)}"]
+    needs = "" if choice.sensor is None else f", with {_sensor_in_words(choice.sensor)} measured"
+    words = [f"{test[0].upper()}{test[1:]}{needs}, decides between {names} with {_sure(choice.promise)}"]
     again = None if found.again is None or _same(found.again, choice) else found.again
     words[0] += "." if again is None else f"; as was, {_sure(again.promise)}."
     if choice.promise < DECIDES:
@@ -129,7 +129,7 @@ def _let_go(design: Design, present: PresentTest) -> str:
 def precise_test_in_words(found: PreciseTest) -> str:
     """Which test tells a value as closely as is wanted."""
     test = design_in_words(found.design, found.present)
-    said = f"{test[0].upper()}{test[1:]} brings the 95 % interval of {found.key} to +- {percent(found.width)} of it"
+    said = f"{test[0].upper()}{test[1:]}, brings the 95 % interval of {found.key} to +- {percent(found.width)} of it"
     again = "" if math.isnan(found.again) else f"; as was again, +- {percent(found.again)}"
     said += f" (now +- {percent(found.now)}{again})."
     if found.width > found.wanted:
