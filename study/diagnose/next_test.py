@@ -122,7 +122,7 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: 
         asked += len(further)
         every = [*found, *(choice for choice in further if choice is not None)]
         heard = list(islice(_different(sorted(every, key=lambda choice: choice.merit, reverse=True)), 3))
-    best = heard[0]
+    best = heard[0] if rehearsals or not good else heard[-1]  # without a rehearsal the surest
     if rehearsals and best.promise >= WORTH:
         tested = list[Choice]()
         for choice in heard:

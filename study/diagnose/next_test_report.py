@@ -12,7 +12,7 @@ from tabulate import tabulate
 from study.compare.comparison_report import as_json
 from study.diagnose.designs import AS_WAS, BLOW, LET_GO, MULTISINE, SWEEP, Design, Limits, PresentTest
 from study.diagnose.diagnosis_sentences import effect_in_words
-from study.diagnose.next_test import DECIDES, Choice, NextTest, driving
+from study.diagnose.next_test import DECIDES, WORTH, Choice, NextTest, driving
 from study.diagnose.precision import PreciseTest
 from study.diagnose.ranked import Ranked
 from study.figures.labels import prefixed
@@ -47,6 +47,8 @@ def next_test_in_words(found: NextTest) -> str:
         ]  # fmt: skip
         if level:
             words.append(f"It would not tell, if the first is true, {enumerated(level)}.")
+    if not choice.rehearsed and choice.promise >= WORTH:
+        words.append("That is by sensitivities alone: the test cannot be rehearsed together with this record.")
     if choice.sensor is not None:
         words.append(
             "That counts on noise in the same proportion to the motion as now; diagnose its record by itself "
@@ -150,15 +152,20 @@ def pair_table(found: NextTest) -> str:
 
 
 def next_test_fields(found: NextTest) -> dict[str, Any]:
-    """What ``plan.json`` holds."""
+    """Which test it is, for ``plan.json`` and ``diagnosis.json``."""
     rows = found.rivals.rows
     return {
         "rivals": [list(row.names) for row in rows],
-        "test": design_fields(found.choice.design), "promise": found.choice.promise,
-        "sensor": None if found.choice.sensor is None else str(found.choice.sensor),
-        "told_apart": found.choice.pairs.tolist(), "rehearsed": found.choice.rehearsed,
-        "as_was": None if found.again is None else found.again.promise, "asked": found.asked,
+        "test": design_fields(found.choice.design),
+        "sensor": None if found.choice.sensor is None else str(found.choice.sensor), "asked": found.asked,
     }  # fmt: skip
+
+
+def promise_fields(found: NextTest) -> dict[str, Any]:
+    """How sure it is, in ``plan.json``."""
+    again = None if found.again is None else found.again.promise
+    pairs, rehearsed = found.choice.pairs.tolist(), found.choice.rehearsed
+    return {"promise": found.choice.promise, "told_apart": pairs, "rehearsed": rehearsed, "as_was": again}
 
 
 def design_fields(design: Design) -> dict[str, Any]:
@@ -184,7 +191,9 @@ def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
 
     said, rivals = next_test_in_words(found), found.rivals
     driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"))
-    scale, files = _plan_files(next_test_fields(found), said, found.limits, driven, rivals.prepared)
+    scale, files = _plan_files(
+        next_test_fields(found) | promise_fields(found), said, found.limits, driven, rivals.prepared
+    )
     return f"{pair_table(found)}\n\n{said}{scale}", files | next_test_pictures(found)
 
 
