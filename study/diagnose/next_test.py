@@ -50,16 +50,17 @@ class Choice:
     design: Design
     sensor: Sensor | None  # one that the test needs beside those of the record
     pairs: Floats  # probability that each pair of rivals is told apart, the one of the row being true, shape (r, r)
+    alone: Floats  # probability that each rival stands alone at the end, if it is true, shape (r,)
     rehearsed: int = 0  # times that it was simulated; none: by sensitivities alone
 
     @property
     def promise(self) -> float:
-        """Probability that the true rival is told from its closest, whichever is true: the smallest of the pairs."""
-        return float(np.min(self.pairs))
+        """Probability that the true rival stands alone at the end; any may be the true one."""
+        return float(np.mean(self.alone))
 
     @property
     def merit(self) -> tuple[float, float]:
-        """By which tests are compared: where none tells the closest pair, those that tell most others are better."""
+        """By which tests are compared: of those that promise alike the one that tells more pairs."""
         return round(self.promise, 2), float(np.mean(self.pairs))
 
 
@@ -142,7 +143,7 @@ def _screened(rivals: Rivals, design: Design, sensor: Sensor | None = None) -> C
     except StudyError:
         return None
     pairs = rivals.decided(distances, alone=sensor is not None)
-    return Choice(design, sensor, pairs)
+    return Choice(design, sensor, pairs, np.min(pairs, axis=1))
 
 
 def _different(found: Sequence[Choice]) -> Iterator[Choice]:
@@ -171,7 +172,8 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
     rehearsals show about their means. Where the test cannot be judged so, the choice is as it was.
     """
     rng, count = np.random.default_rng(1), len(rivals.rows)
-    means, spreads = np.full((count, count), np.inf), list[Floats]()
+    means, spreads = np.full((count, count), np.inf), list[float]()
+    closest = np.zeros(count)
     for true in range(count):
         behind = list[Floats]()
         for _ in range(times):
@@ -183,9 +185,12 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
         if len(behind) < times:
             return choice
         means[true, np.arange(count) != true] = np.mean(behind, axis=0)
-        spreads.append(np.var(behind, axis=0, ddof=1) if times > 1 else np.ones(count - 1))
+        nearest = np.min(behind, axis=1)
+        closest[true] = float(np.mean(nearest))
+        spreads.append(float(np.var(nearest, ddof=1)) if times > 1 else 1.0)
     spread = np.sqrt(max(1.0, float(np.mean(spreads))) * (1.0 + 1.0 / times))
-    return replace(choice, pairs=ndtr((means - K) / spread), rehearsed=count * times)
+    alone = ndtr((closest - K) / spread)
+    return replace(choice, pairs=ndtr((means - K) / spread), alone=alone, rehearsed=count * times)
 
 
 def simulated(rivals: Rivals, choice: Choice, true: int, rng: np.random.Generator) -> Record:

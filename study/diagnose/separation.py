@@ -84,22 +84,24 @@ class Rivals:
         return tuple(row.fit for row in self.rows)
 
     def distances(self, design: Design, further: Sensor | None = None) -> Floats:
-        """T of a test, of each true rival (rows) against each other (columns), shape (r, r).
+        """T of a test in blocks of time, of each true rival (rows) against each other, shape (r, r, blocks).
 
         With a ``further`` sensor that of the test alone: this record has none to be held against.
         """
         outputs, noise = self.seen(further)
         answers = [respond(fit, design, outputs.sensors, differentiate=True) for fit in self.fits]
-        found = np.zeros((len(self.rows), len(self.rows)))
+        found = list[Floats]()
         for j, (other, jacobian) in enumerate(answers):
             columns = outputs.whitened(outputs.stacked(jacobian), noise) / self.size
             rows = np.vstack([columns, self._prior(j, columns.shape[1], further)])
-            for i, (true, _) in enumerate(answers):
-                if i != j:
-                    target = np.zeros(len(rows))
-                    target[: len(columns)] = outputs.whitened(outputs.stacked(true - other), noise) / self.size
-                    found[i, j] = float(np.sum((target - rows @ least_squares(rows, target, 1e-9)) ** 2))
-        return found
+            for true, _ in answers:
+                target = np.zeros(len(rows))
+                target[: len(columns)] = outputs.whitened(outputs.stacked(true - other), noise) / self.size
+                left = target - rows @ least_squares(rows, target, 1e-9)
+                known = float(np.sum(left[len(columns) :] ** 2))
+                power = block_powers(left[: len(columns)])
+                found.append(power + known / len(power))
+        return np.array(found).reshape(len(answers), len(answers), -1).transpose(1, 0, 2)
 
     def left(self, design: Design, true: int, other: int, further: Sensor | None = None) -> Floats:
         """What a rival leaves of the answer of the true one, its coefficients adjusted, shape (n, sensors)."""
@@ -148,12 +150,19 @@ class Rivals:
     def decided(self, distances: Floats, alone: bool = False) -> Floats:
         """Probability that each pair is told apart, the rival of the row being true, shape (r, r); one on the diagonal.
 
-        By this record and the test together, or by the test ``alone``.
+        By this record and the test together, or by the test ``alone``, from T in blocks: that is how residuals are
+        compared (:func:`study.support.statistics.worse`), by their mean or by their ranks, so that a few loud blocks
+        decide less than their T says.
         """
-        ahead, apart = (np.zeros_like(distances),) * 2 if alone else (self.ahead, self.apart)
-        error = 2.0 * np.sqrt(np.maximum(apart + distances, np.finfo(float).tiny))
-        found = ndtr((ahead + distances) / error - K)
-        np.fill_diagonal(found, 1.0)
+        ahead, apart = (np.zeros(distances.shape[:2]),) * 2 if alone else (self.ahead, self.apart)
+        total, count = np.sum(distances, axis=2), distances.shape[2]
+        uneven = count * np.var(distances, axis=2, ddof=1)
+        error = np.sqrt(np.maximum(4.0 * (apart + total) + uneven, np.finfo(float).tiny))
+        rank = np.argsort(np.argsort(distances, axis=2), axis=2) + 1.0
+        by_rank = np.sum(rank * (2.0 * ndtr(0.5 * np.sqrt(distances)) - 1.0), axis=2) / np.sqrt(np.sum(rank**2, axis=2))
+        found = ndtr(np.maximum((ahead + total) / error, by_rank) - K)
+        diagonal = np.arange(len(found))
+        found[diagonal, diagonal] = 1.0
         return np.asarray(found, dtype=np.float64)
 
 

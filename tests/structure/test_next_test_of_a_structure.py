@@ -50,8 +50,8 @@ def test_a_sensor_where_none_is_tells_more(rivals):
     assert [str(s) for s in outputs.sensors] == ["mass2 displacement", "mass1 displacement"]
     assert len(noise) == 2
     both, one = rivals.distances(design, Sensor("mass1", "displacement")), rivals.distances(design, sensors[-1])
-    assert both.shape == one.shape == (2, 2)
-    assert float(both[0, 1]) > 0.0
+    assert both.shape[:2] == one.shape[:2] == (2, 2)
+    assert float(np.sum(both[0, 1])) > 0.0
 
 
 def test_the_plan_of_a_structure_is_written(rivals):
