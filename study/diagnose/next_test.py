@@ -185,12 +185,12 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
         if len(behind) < times:
             return choice
         means[true, np.arange(count) != true] = np.mean(behind, axis=0)
-        nearest = np.min(behind, axis=1)
+        nearest: Floats = np.min(behind, axis=1)
         closest[true] = float(np.mean(nearest))
         spreads.append(float(np.var(nearest, ddof=1)) if times > 1 else 1.0)
     spread = np.sqrt(max(1.0, float(np.mean(spreads))) * (1.0 + 1.0 / times))
-    alone = ndtr((closest - K) / spread)
-    return replace(choice, pairs=ndtr((means - K) / spread), alone=alone, rehearsed=count * times)
+    pairs, alone = (np.asarray(ndtr((x - K) / spread), dtype=np.float64) for x in (means, closest))
+    return replace(choice, pairs=pairs, alone=alone, rehearsed=count * times)
 
 
 def simulated(rivals: Rivals, choice: Choice, true: int, rng: np.random.Generator) -> Record:

@@ -160,10 +160,10 @@ class Rivals:
         error = np.sqrt(np.maximum(4.0 * (apart + total) + uneven, np.finfo(float).tiny))
         rank = np.argsort(np.argsort(distances, axis=2), axis=2) + 1.0
         by_rank = np.sum(rank * (2.0 * ndtr(0.5 * np.sqrt(distances)) - 1.0), axis=2) / np.sqrt(np.sum(rank**2, axis=2))
-        found = ndtr(np.maximum((ahead + total) / error, by_rank) - K)
+        found = np.asarray(ndtr(np.maximum((ahead + total) / error, by_rank) - K), dtype=np.float64)
         diagonal = np.arange(len(found))
         found[diagonal, diagonal] = 1.0
-        return np.asarray(found, dtype=np.float64)
+        return found
 
 
 def rivals_of(rows: Sequence[Ranked], prepared: Prepared) -> Rivals:
