@@ -18,6 +18,7 @@ from study.diagnose.separation import allowed, limit_share, own_limits, respond,
 from study.diagnose.verdict import diagnose
 from study.equations.terms import LIBRARY
 from study.identify.time_domain.part_fit import fit_part
+from study.interface.planned import planned
 from study.records.interpolation import between_samples
 from study.records.record import Sensor
 from study.support.errors import StudyError
@@ -230,3 +231,16 @@ def test_the_distance_that_is_needed_is_the_one_of_the_constants():
     from scipy.special import ndtri
 
     assert (2.0 * (K + float(ndtri(0.95)))) ** 2 == pytest.approx(86.3, abs=0.1)
+
+
+def test_a_notebook_has_the_same_plan(diagnosis, plan, tmp_path):
+    own = plan.limits
+    found = planned(diagnosis, (own.force, own.displacement, own.length), None)
+    assert found.promise == pytest.approx(plan.choice.promise, abs=0.05)
+    assert list(found.to_frame().columns) == ["base_acceleration"]
+    assert "decides between" in found.says
+    assert "told from" in found.table()
+    found.save(tmp_path / "plan")
+    assert (tmp_path / "plan" / "next_test.wav").is_file()
+    with pytest.raises(StudyError, match="expected one value and a share of it"):
+        planned(diagnosis, (None, None, None), {"c": 0.1, "k": 0.1})
