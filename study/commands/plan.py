@@ -27,6 +27,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     limits.add_argument("--max-length", type=finite_number(above=0.0), metavar="SECONDS", help="longest test")
     parser.add_argument(
+        "--sensor", action="append", default=[], metavar="NAME",
+        help="a sensor that could be added, as 'floor2 acceleration' (default: any)",
+    )  # fmt: skip
+    parser.add_argument(
         "--precision", type=_precision, metavar="KEY=PERCENT",
         help="ask for the test that brings the 95 %% interval of a value to so much of it, as k3=5%%",
     )  # fmt: skip
@@ -73,7 +77,7 @@ def _run(arguments: argparse.Namespace) -> None:
         else:
             rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
             limits = limits_asked(rivals.fits, rivals.present, *asked)
-            words, files = deciding_plan(next_test(rivals, limits, progress=step))
+            words, files = deciding_plan(next_test(rivals, limits, sensors=arguments.sensor, progress=step))
     write_files(folder, files, inputs_of(arguments))
     print(f"{words}\n\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 

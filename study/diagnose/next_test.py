@@ -92,19 +92,28 @@ def tied_rows(diagnosis: Diagnosis, most: int = 6) -> tuple[Ranked, ...]:
     return diagnosis.sets[:most]
 
 
-def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: Doing = lambda _: None) -> NextTest:
+def next_test(
+    rivals: Rivals,
+    limits: Limits,
+    *,
+    sensors: Sequence[str] = (),
+    rehearsals: int = 3,
+    progress: Doing = lambda _: None,
+) -> NextTest:
     """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
 
     Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet. Up to three tests
     are rehearsed, so many times with each rival true: the cheapest first, then one that is dearer, then the surest.
 
+    ``sensors`` names those that may be added, as ``right displacement``; any if left out.
+
     Raises
     ------
     StudyError
-        If the limits allow no test.
+        If the limits allow no test, or there is no such sensor.
     """
     progress("comparing tests")
-    fits, present = rivals.fits, rivals.present
+    fits, present, extra = rivals.fits, rivals.present, further_sensors(rivals, sensors)
     screened = (_screened(rivals, design) for design in allowed(fits, present, limits))
     found = [choice for choice in screened if choice is not None]
     again = next((c for c in found if c.design.kind == present.kinds[0][0] and c.design.level == 1.0), None)
@@ -119,7 +128,7 @@ def next_test(rivals: Rivals, limits: Limits, *, rehearsals: int = 3, progress: 
         listed = sorted([*good, *shorter], key=lambda choice: choice.design.effort)
         heard = [listed[0], listed[len(listed) // 2], found[0]]
     else:
-        further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in further_sensors(rivals)]
+        further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in extra]
         asked += len(further)
         every = [*found, *(choice for choice in further if choice is not None)]
         heard = list(islice(_different(sorted(every, key=lambda choice: choice.merit, reverse=True)), 3))
@@ -156,13 +165,21 @@ def _different(found: Sequence[Choice]) -> Iterator[Choice]:
             yield choice
 
 
-def further_sensors(rivals: Rivals) -> tuple[Sensor, ...]:
-    """Motions of any coordinate that the record does not show."""
-    if rivals.present.prescribed:
-        return ()
+def further_sensors(rivals: Rivals, names: Sequence[str] = ()) -> tuple[Sensor, ...]:
+    """Motions of any coordinate that the record does not show, or those of them that have these names.
+
+    Raises
+    ------
+    StudyError
+        If there is no such sensor, or the record has it.
+    """
     known = rivals.prepared.outputs.sensors
-    every = (Sensor(c, m) for c in rivals.rows[0].fit.model.coordinates for m in MOTIONS)
-    return tuple(sensor for sensor in every if sensor not in known)
+    every = (Sensor(c, m) for c in rivals.fits[0].model.coordinates for m in MOTIONS)
+    found = {str(sensor): sensor for sensor in every if sensor not in known and not rivals.present.prescribed}
+    for name in names:
+        there = ", ".join(repr(own) for own in found) or "none"
+        expect(name in found, f"{name!r} is no sensor beside those of the record; expected one of {there}")
+    return tuple(found[name] for name in names or found)
 
 
 def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:

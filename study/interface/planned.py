@@ -3,7 +3,7 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -101,7 +101,10 @@ class PlannedTest:
 
 
 def planned(
-    diagnosis: Diagnosis, limits: tuple[float | None, float | None, float | None], precision: Mapping[str, float] | None
+    diagnosis: Diagnosis,
+    limits: tuple[float | None, float | None, float | None],
+    precision: Mapping[str, float] | None,
+    sensors: Sequence[str] = (),
 ) -> PlannedTest:
     """What :meth:`Diagnosis.plan` does; its arguments."""
     prepared = diagnosis.comparison.prepared
@@ -111,5 +114,5 @@ def planned(
         found = precise_test((diagnosis.answer or diagnosis.comparison).fit, prepared, key, wanted, limits)
         return PlannedTest(found, Words(precise_test_in_words(found)))
     rivals = rivals_of(tied_rows(diagnosis), prepared)
-    decides = next_test(rivals, limits_asked(rivals.fits, rivals.present, *limits))
+    decides = next_test(rivals, limits_asked(rivals.fits, rivals.present, *limits), sensors=sensors)
     return PlannedTest(decides, Words(next_test_in_words(decides)))

@@ -197,6 +197,13 @@ def test_limits_that_allow_nothing_are_one_sentence(rivals, force, displacement,
         next_test(rivals, limits, rehearsals=0)
 
 
+def test_an_unknown_sensor_is_one_sentence(rivals, plan):
+    with pytest.raises(
+        StudyError, match="'roof displacement' is no sensor beside those of the record; expected one of"
+    ):
+        next_test(rivals, plan.limits, sensors=["roof displacement"])
+
+
 def test_no_tie_is_one_sentence(diagnosis):
     with pytest.raises(StudyError, match="nothing is tied with another; expected a record"):
         tied_rows(replace(diagnosis, sets=diagnosis.sets[:1]))
