@@ -165,6 +165,10 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     bands = {name: (a, min(b, most)) for name, (a, b) in bands.items() if a < 0.8 * most}
     based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
     deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table
+    expect(
+        bool(drivers) or bool(np.any(deflection)),
+        f"{record.name}: no displacement or velocity tells from where it was let go; expected one to plan a release",
+    )
     return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based)
 
 
@@ -225,7 +229,8 @@ def _loudest(
     if present.drivers:
         level = (limits.displacement if present.prescribed else limits.force) / float(np.max(present.peaks))
     else:
-        level = limits.displacement / float(np.max(np.abs(present.deflection[: present.coordinates])))
+        share = reached(make(1.0))
+        level = 1.0 / share if 0.0 < share < np.inf else 1.0
     above = np.inf
     for _ in range(12):
         share = reached(make(level))

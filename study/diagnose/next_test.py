@@ -318,8 +318,8 @@ def suggested(diagnosis: Diagnosis) -> NextTest | None:
     """
     if diagnosis.answer is None or len(diagnosis.sets) < 2:
         return None
-    rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
     try:
+        rivals = rivals_of(tied_rows(diagnosis), diagnosis.comparison.prepared)
         return next_test(rivals, own_limits(rivals.fits, rivals.present, 2.0), rehearsals=0)
-    except StudyError:
+    except (StudyError, np.linalg.LinAlgError):
         return None
