@@ -10,7 +10,7 @@ import pytest
 STUDY = Path(__file__).parents[1] / "study"
 FLOORS = (
     "cli", "commands", "interface", "explore", "trials", "gallery", "reproduction", "diagnose", "way_in",
-    "faults", "compare", "figures", "identify", "equations", "records", "support",
+    "faults", "compare", "figures", "identify", "export", "equations", "records", "support",
 )  # fmt: skip
 FILES = sorted(STUDY.rglob("*.py"))
 LOOSE = {"__init__", "__main__", "cli"}
