@@ -14,7 +14,6 @@ from study.support.arrays import Floats
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
 NOTHING = 1e-150  # a force below counts as zero
 SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
-FEW = 3  # names in a sentence
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 
 
@@ -60,8 +59,8 @@ def repeated_along(model: Model, motion: Mapping[str, Floats], record: str) -> s
 
 def _some(names: Sequence[str]) -> str:
     """Names that fit into a sentence."""
-    more = len(names) - FEW
-    return " and ".join(names) if more <= 1 else f"{', '.join(names[:FEW])} and {more} others"
+    first, others = names[:3], len(names) - 3
+    return " and ".join(names) if others <= 1 else f"{', '.join(first)} and {others} others"
 
 
 def _forces(model: Model, motion: Mapping[str, Floats]) -> tuple[tuple[str, ...], Floats]:

@@ -26,14 +26,11 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.units import parse_unit
 
-FORMAT = 1  # of motion.bin, as c/fmu.c reads it
-LONE = 1.0  # s, the largest step of a motion without rates: a mass that nothing ties down
 INPUT = {"causality": "input", "variability": "continuous"}
 STATE = {"causality": "local", "variability": "continuous", "initial": "exact"}  # its value is that at the start
 PARAMETER = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
 MOVING = {"causality": "output", "variability": "continuous", "initial": "exact"}
 COMPUTED = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-WRITTEN = (2000, 1, 1, 0, 0, 0)  # the same model gives the same bytes
 
 
 def fmu(made: Exported, step: float | None = None) -> bytes:
@@ -60,8 +57,8 @@ def fmu(made: Exported, step: float | None = None) -> bytes:
     files |= {f"sources/{path.name}": path.read_bytes() for path in sorted(kernels.SOURCES.iterdir())}
     written = io.BytesIO()
     with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path, content in files.items():
-            archive.writestr(zipfile.ZipInfo(path, WRITTEN), content, zipfile.ZIP_DEFLATED)
+        for path, content in files.items():  # of one date: the same model gives the same bytes
+            archive.writestr(zipfile.ZipInfo(path, (2000, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
     return written.getvalue()
 
 
@@ -70,14 +67,14 @@ def usual_step(name: str, motion: MotionProgram) -> float:
     rest = {key: np.zeros(1) for key in list(motion.program.inputs)[: 1 + len(motion.drive) + motion.states]}
     rate = float(rates_at(motion, rest, 1)[0])
     expect(np.isfinite(rate), f"model {name!r} has no finite rates at rest; expected '--step' in seconds")
-    return TURN / rate if rate > 0.0 else LONE
+    return TURN / rate if rate > 0.0 else 1.0  # what nothing ties down has no rate
 
 
 def _program(motion: MotionProgram, step: float) -> bytes:
-    """What ``c/fmu.c`` reads behind the GUID."""
+    """What ``c/fmu.c`` reads behind the GUID: the version of its form, sizes, arrays."""
     p = motion.program
     head = (
-        FORMAT, len(p.code), motion.split, len(p.inputs), p.first, len(p.registers), *motion.slots.shape,
+        1, len(p.code), motion.split, len(p.inputs), p.first, len(p.registers), *motion.slots.shape,
         len(motion.sides), len(motion.drive), motion.dofs, motion.states, len(motion.observed),
     )  # fmt: skip
     whole = (p.code, motion.slots, motion.sides, motion.by_side, motion.shifts, motion.observed)
