@@ -272,12 +272,22 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
     return drive, tuple(starts), places
 
 
-@lru_cache(maxsize=8)
 def _between(values: bytes, factor: int, reading: str) -> Floats:
-    """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
+    """A channel between its samples; a diagnosis makes hundreds of runs under the same force.
+
+    Of long ones two are kept: each takes as many megabytes as all else that is known of a record.
+    """
+    long = len(values) * factor > 1 << 24  # bytes
+    return (_between_few if long else _between_many)(values, factor, reading)
+
+
+def _interpolated(values: bytes, factor: int, reading: str) -> Floats:
     fine = between_samples(np.frombuffer(values), factor, reading)
     fine.flags.writeable = False
     return fine
+
+
+_between_many, _between_few = lru_cache(maxsize=8)(_interpolated), lru_cache(maxsize=2)(_interpolated)
 
 
 def predict_response(

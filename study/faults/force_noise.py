@@ -4,8 +4,10 @@ The spectrum of what is left is held against two kinds of noise by Whittle's lik
 response: noise on the force behind the structure, and noise on the response itself; both white or of first order.
 """
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -99,7 +101,10 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     run, quiet = left.run, np.concatenate(left.predicted)[:, 0]
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
-    def logarithm(white: Floats) -> Floats | None:
+    def logarithm(state: Mapping[str, Any]) -> Floats | None:
+        own = np.random.default_rng(0)
+        own.bit_generator.state = state
+        white = own.standard_normal(len(record))
         noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
         noisy = replace(left.prepared, record=record.with_channels({force: record[force] + size * noise}))
         with suppress(DivergenceError):
@@ -109,12 +114,18 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
             return np.log(power) if np.all(power > 0.0) else None
         return None
 
-    drawn = [rng.standard_normal(len(record)) for _ in range(RUNS)]
-    logarithms = [found for found in side_by_side(logarithm, drawn) if found is not None]
-    if not logarithms:
+    drawn = list[Mapping[str, Any]]()  # where the numbers of each run begin: all of them would fill the memory
+    for _ in range(RUNS):
+        drawn.append(rng.bit_generator.state)
+        rng.standard_normal(len(record))
+    total, count = np.zeros(0), 0
+    for found in side_by_side(logarithm, drawn):
+        if found is not None:
+            total, count = total + found if count else found, count + 1
+    if not count:
         return None
-    near, whole = np.ones(LINES), np.ones(len(logarithms[0]))
-    smooth = np.convolve(np.mean(logarithms, axis=0), near, "same") / np.convolve(whole, near, "same")
+    near, whole = np.ones(LINES), np.ones(len(total))
+    smooth = np.convolve(total / count, near, "same") / np.convolve(whole, near, "same")
     return np.exp(smooth + np.euler_gamma)  # whose periodograms scatter as a chi squared of two degrees of freedom
 
 
