@@ -1,9 +1,8 @@
 """Seeded force histories, their theoretical autospectra, and the noise on the response.
 
 Every history closes on itself (``periods`` times in the record, swept sines aside) and has no content above its
-cut-off but what the ends of sweeps and steps and the flanks of blows add, so that its band-limited interpolation between
-the samples is exact. Force and noise use two independent
-streams of one seed.
+cut-off but what the ends of sweeps and steps and the flanks of blows add, so that its band-limited interpolation
+between the samples is exact. Force and noise use two independent streams of one seed.
 """
 
 from collections.abc import Callable
@@ -255,9 +254,9 @@ def _gaussian_band(excitation: Excitation, length: int, dt: float, generator: np
 
 def _stepped_sine(excitation: Excitation, length: int, dt: float, _random: np.random.Generator) -> Floats:
     """Whole cycles at each frequency, so that one goes on where the other ends, at zero."""
-    bounds = np.linspace(0, length, excitation.steps + 1).astype(np.int64)
+    bounds: list[int] = [round(length * k / excitation.steps) for k in range(excitation.steps + 1)]
     spaced = np.geomspace if excitation.sweep == "logarithmic" else np.linspace
-    wanted = spaced(excitation.start_frequency, excitation.stop_frequency, excitation.steps)
+    wanted = spaced(excitation.start_frequency, excitation.stop_frequency, excitation.steps).tolist()
     values = np.zeros(length)
     for begin, end, frequency in zip(bounds, bounds[1:], wanted, strict=False):
         cycles = max(1, round(frequency * (end - begin) * dt))
