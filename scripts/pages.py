@@ -45,8 +45,8 @@ def main(inputs: Mapping[str, Sequence[str]], outputs: Mapping[str, str], told: 
             page = whole_page.study_page(results, pictures)
         elif name == "html":
             page = document.document_page(study_pages.TITLE, study_pages.titled("summary", results)).encode()
-        elif name in whole_page.DOCUMENTS:
-            page = document.markdown(whole_page.DOCUMENTS[name](results)).encode()
+        elif name in whole_page.WHOLE_DOCUMENTS:
+            page = document.markdown(whole_page.WHOLE_DOCUMENTS[name](results)).encode()
         else:
             page = document.markdown(study_pages.titled(name, results)).encode()
         replace_file(Path(path), page)

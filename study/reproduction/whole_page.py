@@ -6,7 +6,7 @@ import pandas as pd
 
 from study.reproduction import study_pages
 from study.reproduction.chapters.chapter import HELD, get_chapter
-from study.reproduction.chapters.contents import CHAPTERS, STRUCTURES
+from study.reproduction.chapters.contents import CHAPTERS, OF_STRUCTURES
 from study.reproduction.study_pages import SECTIONS, Results, claim_folds, each_row, shortened, verdict_blocks
 from study.support import document
 from study.support.document import Block, Bullets, Heading, PageSection, Picture, Text, table
@@ -41,7 +41,7 @@ def chapter_blocks(name: str, results: Results) -> list[Block]:
         table(("verdict", "claim", "measured", "why"), rows),
         *get_chapter(name).told(_tables(results, name)),
     ]
-    if name == STRUCTURES:
+    if name == OF_STRUCTURES:
         own += study_pages.structure_blocks(results)
     return [*own, Heading("What each verdict rests on", 3), *claim_folds(claims.assign(where="", reported=""))]
 
@@ -80,4 +80,4 @@ def study_page(results: Results, pictures: Sequence[Picture]) -> bytes:
     return document.picture_page(study_pages.TITLE, sections)
 
 
-DOCUMENTS: Mapping[str, Callable[[Results], list[Block]]] = {"part_two": part_two_blocks}
+WHOLE_DOCUMENTS: Mapping[str, Callable[[Results], list[Block]]] = {"part_two": part_two_blocks}

@@ -15,7 +15,7 @@ class Contents:
     figures: Mapping[str, str]  # figures/<name>.png and .svg, and what each shows
 
 
-STRUCTURES = "structures"  # the chapter whose cases are in config/structures.tsv
+OF_STRUCTURES = "structures"  # the chapter whose cases are in config/structures.tsv
 
 CHAPTERS: Mapping[str, Contents] = {
     "excitations": Contents(
@@ -53,7 +53,7 @@ CHAPTERS: Mapping[str, Contents] = {
             "noise_bias": "bias and scatter of each coefficient, and theory",
         },
     ),
-    STRUCTURES: Contents(
+    OF_STRUCTURES: Contents(
         "fewer_sensors",
         "Several degrees of freedom",
         "Develop procedures for analyzing and identifying different terms in MDOF systems and associated MDOF "

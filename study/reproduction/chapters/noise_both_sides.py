@@ -52,10 +52,10 @@ from study.support.numbers import percent
 BY_LEAST_SQUARES, ON_A_FREE_RUN = ("siso", "miso"), ("instrumental", "output_error")
 PERIODIC = "errors_in_variables"
 COEFFICIENTS = ("m", "c", "k", "k3", "c3")
-RANDOM, REPEATED = "random", "repeated"  # forces
+RANDOM, PERIODIC_FORCE = "random", "repeated"  # forces
 CELL = ["force", "force_noise", "displacement_noise"]
 KEYS = [*CELL, "estimator", "parameter"]
-REMAINDER = (
+UNTOLD = (
     "the remainder of the true force, which the measured one does not tell, moves the mass as well: to the motion that "
     "the model follows, the cubic spring and damper add k and c in proportion to the remainder's own motion"
 )
@@ -71,7 +71,7 @@ def make_noise(study: ClaimSettings, own: NoiseSettings, models: Path) -> Tables
     """
     model = read_model(models / f"{own.system}.yaml")
     rows: list[dict[str, Any]] = []
-    for force, used in ((RANDOM, own.estimators), (REPEATED, own.periodic_estimators)):
+    for force, used in ((RANDOM, own.estimators), (PERIODIC_FORCE, own.periodic_estimators)):
         for seed in range(own.first_seed, own.first_seed + own.seeds):
             for cell in _noisy_records(model, study, own, force, seed):
                 rows += [{"force": force, "seed": seed, **row} for row in _found(model, cell, study, used)]
@@ -94,7 +94,7 @@ def _noisy_records(
     model: Model, study: ClaimSettings, own: NoiseSettings, force: str, seed: int
 ) -> Iterator[_Noisy]:  # fmt: skip
     """One motion under every pair of levels; each pair has noise of its own, so that no two go wrong together."""
-    excitation, level = (own.periodic, own.level) if force == REPEATED else (study.excitation, 1.0)
+    excitation, level = (own.periodic, own.level) if force == PERIODIC_FORCE else (study.excitation, 1.0)
     drive = RecordSettings(
         case=f"{own.system} {force}", excitation=excitation, level=level, noise=0.0, sampling=study.sampling,
         integrator=study.integrator,
@@ -291,7 +291,7 @@ def noise_free_run_attenuated(tables: Tables, expected: Reported) -> Iterator[Co
             f"{row['parameter']} within {percent(allowed)} or {limit:.1f} standard errors of "
             f"{percent(row['theory'], '+.2g')}",
             f"{row['parameter']} {percent(row['bias'], '+.2g', row['bias_error'])}", bool(off <= bound),
-            because=REMAINDER,
+            because=UNTOLD,
         )  # fmt: skip
 
 
@@ -299,12 +299,12 @@ def noise_free_run_ratios(tables: Tables, expected: Reported) -> list[Condition]
     """Natural frequency and damping ratio, whose coefficients are too large together."""
     rows = _rows(tables, "output_error", parameters=("f_n", "zeta"))
     rows = rows[(rows["displacement_noise"] == 0.0) & (rows["force_noise"] > 0.0)]
-    return explained(REMAINDER, _biases(rows, expected.limit("noise_theory"), unbiased=True))
+    return explained(UNTOLD, _biases(rows, expected.limit("noise_theory"), unbiased=True))
 
 
 def noise_repeated_unbiased(tables: Tables, expected: Reported) -> Iterator[Condition]:
     """Periods of one force at every pair of levels."""
-    return _biases(_rows(tables, PERIODIC, REPEATED), expected.limit("noise_exact"), unbiased=True)
+    return _biases(_rows(tables, PERIODIC, PERIODIC_FORCE), expected.limit("noise_exact"), unbiased=True)
 
 
 def noise_in_reverse_best(tables: Tables, _: Reported) -> Iterator[Condition]:
@@ -324,7 +324,7 @@ def noise_output_error_best(tables: Tables, _: Reported) -> Iterator[Condition]:
 def noise_repeated_best(tables: Tables, _: Reported) -> Iterator[Condition]:
     """Both noisy, and a force that repeats."""
     best = tables["noise_best"]
-    keep = (best["force"] == REPEATED) & (best["force_noise"] > 0.0) & (best["displacement_noise"] > 0.0)
+    keep = (best["force"] == PERIODIC_FORCE) & (best["force_noise"] > 0.0) & (best["displacement_noise"] > 0.0)
     return _best(best[keep], (PERIODIC,))
 
 
@@ -345,7 +345,7 @@ def _best(rows: pd.DataFrame, wanted: tuple[str, ...]) -> Iterator[Condition]:
 def noise_map(tables: Tables) -> Figure:
     """The estimators whose worst coefficient is least off, by the noise on force and displacement."""
     worst, best = worst_errors(tables["noise"]), tables["noise_best"]
-    names = {RANDOM: "a random force", REPEATED: "a force that repeats"}
+    names = {RANDOM: "a random force", PERIODIC_FORCE: "a force that repeats"}
     figure, axes = page.empty_page(
         "Which estimator for my noise",
         "those with the least root mean square error of the worst of m, c, k, k3, c3; several are level", columns=2,
@@ -410,13 +410,13 @@ def noise_bias(tables: Tables) -> Figure:
 def _bias_marks(panel: Axes, rows: pd.DataFrame, estimator: str, shift: float) -> None:
     shown, at = look(estimator), 100.0 * rows["displacement_noise"] + 0.6 * shift
     panel.errorbar(
-        at, 100.0 * rows["bias"], 100.0 * rows["scatter"], fmt=MARKERS.get(estimator, "v"), color=shown.colour,
+        at, 100.0 * rows["bias"], 100.0 * rows["scatter"], fmt=BIAS_MARKERS.get(estimator, "v"), color=shown.colour,
         markersize=4.5, elinewidth=1.0, label=shown.label, markerfacecolor="white" if "in" in estimator[:2] else None,
     )  # fmt: skip
     panel.plot(at, 100.0 * rows["theory"], "x", color="black", markersize=4.5, zorder=6.0)
 
 
-MARKERS = {"miso": "s", "local_polynomial": "^", "instrumental": "D", "output_error": "o"}
+BIAS_MARKERS = {"miso": "s", "local_polynomial": "^", "instrumental": "D", "output_error": "o"}
 
 
 def told_noise(tables: Tables) -> list[Block]:

@@ -37,7 +37,7 @@ from study.support.document import Block, Text, table
 from study.support.numbers import percent
 
 CONSTANT, VARYING = "constant", "varying"
-CHANNEL = "support"  # that a stiffness follows, as a test would move it: slowly, and back
+SCHEDULING = "support"  # that a stiffness follows, as a test would move it: slowly, and back
 
 
 def make_varying(study: ClaimSettings, own: VaryingSettings, models: Path) -> Tables:
@@ -76,7 +76,7 @@ def _record(truth: Model, study: ClaimSettings, own: VaryingSettings, seed: int)
     """The motion under the report's force with a sensor's noise; a channel that a formula names goes there and back."""
     n, dt = study.sampling.samples, study.sampling.dt
     drive = force(study.excitation.at_level(1.0), n, dt, seed)
-    channels = {CHANNEL: np.sin(np.pi * np.arange(n) / n) ** 2} if CHANNEL in truth.channels else {}
+    channels = {SCHEDULING: np.sin(np.pi * np.arange(n) / n) ** 2} if SCHEDULING in truth.channels else {}
     integrator = Integrator(**study.integrator.model_dump())
     record = simulate(truth, drive, dt, integrator, extra=channels)
     motion = record["displacement"]

@@ -36,7 +36,7 @@ from study.support.document import Block, Text, table
 from study.support.numbers import percent
 
 RIGHT, WRONG = "right", "wrong"
-POINTS = 1500  # of a pattern that are drawn
+DRAWN_POINTS = 1500  # of a pattern that are drawn
 
 
 def make_forces(study: ClaimSettings, own: ForcesSettings, models: Path) -> Tables:
@@ -103,7 +103,9 @@ def _record(truth: Model, study: ClaimSettings, own: ForcesSettings, level: floa
 def _patterns(truth: Model, record: Record) -> pd.DataFrame:
     """Restoring force over displacement under random excitation and, without a memory, under harmonic motion."""
     random = preliminary.random_pattern(record, truth.numbers()["m"])
-    found = [pd.DataFrame({"motion": "random", "displacement": random.displacement, "force": random.force})[:POINTS]]
+    found = [
+        pd.DataFrame({"motion": "random", "displacement": random.displacement, "force": random.force})[:DRAWN_POINTS]
+    ]
     if not truth.states:
         harmonic = preliminary.harmonic_pattern(truth, *preliminary.harmonic_beside(truth, record))
         found.append(

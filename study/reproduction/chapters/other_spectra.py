@@ -42,9 +42,9 @@ from study.support.document import Block, Text, table
 from study.support.errors import DivergenceError, StudyError
 from study.support.numbers import percent
 
-DRIVEN = "miso_driven_lines"
-IN_REVERSE = ("miso", DRIVEN, "local_polynomial")
-LABELS = {DRIVEN: "MI/SO, driven lines"}
+DRIVEN_LINES = "miso_driven_lines"
+REVERSE_ESTIMATORS = ("miso", DRIVEN_LINES, "local_polynomial")
+LABELS = {DRIVEN_LINES: "MI/SO, driven lines"}
 NAMES = {
     "report": "report's noise", "calm": "slight sea", "moderate": "moderate sea", "rough": "rough sea",
     "multisine": "multisine", "sweep": "swept sine", "stepped": "stepped sine", "blows": "blows",
@@ -103,7 +103,7 @@ def _of_record(
         ) if noise else clean  # fmt: skip
         # A free run takes ten times as long; without noise it is off by its integrator's error alone.
         free = ("output_error",) if seed == own.first_seed else ()
-        used = ("miso", DRIVEN, *free) if noise else ("siso", *IN_REVERSE)
+        used = ("miso", DRIVEN_LINES, *free) if noise else ("siso", *REVERSE_ESTIMATORS)
         about = {
             "system": system, "force": name, "width": float(name.split()[0]) if name.endswith(OCTAVES) else np.nan,
             "noise": noise, "seed": seed,
@@ -122,10 +122,10 @@ def _estimates(
     )  # fmt: skip
     for estimator in used:
         settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]))
-        if estimator == DRIVEN:
+        if estimator == DRIVEN_LINES:
             settings = replace(settings, band=_driven_band(record, settings, own.driven))
         try:
-            found = estimators.identify("miso" if estimator == DRIVEN else estimator, model, record, settings)
+            found = estimators.identify("miso" if estimator == DRIVEN_LINES else estimator, model, record, settings)
         except (DivergenceError, StudyError):  # too few lines, or a fit that leaves the range of numbers
             yield {
                 "estimator": estimator,
@@ -215,7 +215,7 @@ def spectra_seas(tables: Tables, _: Reported) -> list[Condition]:
 
 def spectra_seas_driven(tables: Tables, _: Reported) -> Iterator[Condition]:
     """The same, fitted to the lines that the force drives."""
-    return _recovered(tables, DRIVEN, SEAS)
+    return _recovered(tables, DRIVEN_LINES, SEAS)
 
 
 def spectra_multisine(tables: Tables, _: Reported) -> Iterator[Condition]:
@@ -246,7 +246,7 @@ def spectra_bands(tables: Tables, _: Reported) -> list[Condition]:
         "within a narrow band u^3 is nearly a multiple of u and m (2 pi f)^2 nearly a constant: what one path has, the "
         "other may take, and leakage decides"
     )
-    return explained(because, _recovered(tables, DRIVEN, _bands(tables)))
+    return explained(because, _recovered(tables, DRIVEN_LINES, _bands(tables)))
 
 
 def spectra_output_error(tables: Tables, _: Reported) -> Iterator[Condition]:
@@ -317,7 +317,7 @@ def spectra_siso_changes(tables: Tables, expected: Reported) -> Iterator[Conditi
 def spectra_map(tables: Tables) -> Figure:
     """The worst parameter of every force and system, in tolerances, by each estimator."""
     worst = worst_by_system(tables["excitations"])
-    panels = [("miso", False), (DRIVEN, False), ("local_polynomial", False), ("output_error", True)]
+    panels = [("miso", False), (DRIVEN_LINES, False), ("local_polynomial", False), ("output_error", True)]
     forces = [*NAMES, *_bands(tables)]
     figure, axes = page.empty_page(
         "Forces with other spectra",
@@ -360,7 +360,7 @@ def _map_of(panel: Axes, values: pd.DataFrame, forces: Sequence[str]) -> None:
 def spectra_bands_figure(tables: Tables) -> Figure:
     """The worst parameter against the width of the band, by system."""
     worst = worst_by_system(tables["excitations"][tables["excitations"]["width"].notna()])
-    shown = (("miso", "s"), (DRIVEN, "v"), ("output_error", "o"))
+    shown = (("miso", "s"), (DRIVEN_LINES, "v"), ("output_error", "o"))
     figure, axes = page.empty_page(
         "How narrow may my band be", "1 % noise on the displacement; worst parameter over its tolerance", rows=2,
         columns=4, width=12.0, panel=2.4, legend_rows=1, share=False,
@@ -426,7 +426,13 @@ def told_excitations(tables: Tables) -> list[Block]:
     ]  # fmt: skip
 
 
-NARROWED = (("miso", False), (DRIVEN, False), ("local_polynomial", False), (DRIVEN, True), ("output_error", True))
+NARROWED = (
+    ("miso", False),
+    (DRIVEN_LINES, False),
+    ("local_polynomial", False),
+    (DRIVEN_LINES, True),
+    ("output_error", True),
+)
 
 
 def _narrowest(rows: pd.DataFrame) -> str:
