@@ -12,20 +12,24 @@ from study.support import document
 from study.support.document import Block, Bullets, Heading, PageSection, Picture, Text, table
 
 ONE, TWO = "Part I: the report, run again", "Part II: its recommendations, followed"
-BOTH = ("verdict", "times")  # sections that are of both parts
+BOTH = {"verdict": "", "times": "Both parts"}  # sections of both parts, and what stands above them in the contents
 SEARCH = '<input id="search" type="search" placeholder="search the claims" aria-label="search the claims">'
 ANCHOR = "part-two-"  # begins those of chapters
 
 
-def part_two_verdict(results: Results) -> list[Block]:
-    """How many claims hold, what each chapter is, and what had to be left out."""
-    claims = results["part_two_claims"]
+def part_two_sentence(claims: pd.DataFrame) -> str:
+    """How many claims of Part II hold."""
     whole, part, none = (int((claims["verdict"] == word).sum()) for word in HELD)
-    lines = [
+    return (
         f"**Part II, the report's recommendations followed: {whole} of {len(claims)} claims hold**, {part} partly, "
-        f"{none} "
-        "do not. Each was written down with its tolerance before the run; what fails is a finding, with its reason."
-    ]
+        f"{none} do not."
+    )
+
+
+def part_two_verdict(results: Results) -> list[Block]:
+    """How many claims hold, and what had to be left out."""
+    said = "Each was written down with its tolerance before the run; what fails is a finding, with its reason."
+    lines = [f"{part_two_sentence(results['part_two_claims'])} {said}"]
     for name, contents in CHAPTERS.items():
         lines += [f"{contents.title}: {left}" for left in get_chapter(name).left_out(_tables(results, name))]
     return [Bullets(tuple(lines))]
@@ -67,7 +71,7 @@ def study_page(results: Results, pictures: Sequence[Picture]) -> bytes:
         blocks = make(results) if anchor != "verdict" else [*verdict_blocks(results), *part_two_verdict(results)]
         search = SEARCH if anchor == "claims" else ""
         found = search + document.fragment_without_images(blocks)
-        sections.append(PageSection(anchor, title, found, "" if anchor in BOTH else ONE))
+        sections.append(PageSection(anchor, title, found, BOTH.get(anchor, ONE)))
     by_system = [picture for picture in pictures if picture.group not in CHAPTERS]
     sections.insert(1, PageSection("figures", "Figures", document.picture_groups(by_system), ONE))
     chapters: list[PageSection] = []
