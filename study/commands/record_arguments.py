@@ -105,6 +105,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--cutoff", type=finite_number(above=0.0), metavar="HZ",
         help="integrate measured accelerations above this frequency and judge nothing below (default: from the record)",
     )  # fmt: skip
+    judging.add_argument(
+        "--horizon", type=finite_number(above=0.0), metavar="S",
+        help="of a mass without a spring, whose motion drifts: fit and judge it over S seconds from a state of its own "
+        "(default: some periods of its motion)",
+    )  # fmt: skip
 
 
 def span(text: str) -> Span:
@@ -174,7 +179,14 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
     alternate = arguments.judge == ALTERNATE
     fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)
     return Layout(
-        tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff, arguments.as_sampled
+        tuple(arguments.use),
+        fit,
+        judge,
+        alternate,
+        arguments.response,
+        arguments.cutoff,
+        arguments.as_sampled,
+        arguments.horizon,
     )
 
 

@@ -342,16 +342,18 @@ def fitted(
     model: Model, record: Record | Sequence[Record], *, fit: Samples | None,
     judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
     cutoff: float | None, estimator: str, measurement: Given | bool | None, as_sampled: bool,
-    absolute: bool, each_record: Sequence[str],
+    absolute: bool, each_record: Sequence[str], horizon: float | None,
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
     records, separate = records_of(record), tuple[Separate, ...]()
     settings = settings_asked(records[0].source, measurement)
     expect(cutoff is None or 0.0 < cutoff < math.inf, f"cutoff is {cutoff!r}; expected a frequency above 0 Hz")
+    expect(horizon is None or 0.0 < horizon < math.inf, f"horizon is {horizon!r}; expected a time above 0 s")
     alternate = judge == "every-other-block"
     layout = Layout(
         tuple(_stretch(pair) for pair in use), _samples("fit", fit, records[0]),
         None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, as_sampled,
+        horizon,
     )  # fmt: skip
     equation, asked = model.equation, list[measured.Record](distinct(records))
     if each_record:
