@@ -23,6 +23,7 @@ from study.reproduction.settings import (
     Rate,
     Sampling,
     Seed,
+    Seeds,
 )
 from study.support.config_files import Section
 from study.support.document import Block
@@ -42,6 +43,7 @@ class NoiseSettings(Ensembles):
     periodic: ExcitationSettings  # a force that repeats, for an estimator that lives on it
     level: float  # its mean square, N^2
     periodic_estimators: Names
+    free_runs: Seeds  # of that force with a fit in free run
     tie: Positive  # standard errors of the difference within which two estimators are level
     negligible: Positive  # relative errors that nobody tells apart
 

@@ -170,7 +170,7 @@ def sensors_map(tables: Tables) -> Figure:
         "effect that is there", columns=len(structures), width=5.6 * len(structures), panel=2.9, legend_rows=0,
         share=False,
     )  # fmt: skip
-    figure.subplots_adjust(left=0.24, bottom=0.2, wspace=0.7)
+    figure.subplots_adjust(left=0.24, bottom=0.22, wspace=0.85)
     for panel, structure in zip(axes, structures, strict=True):
         own = t[t["structure"] == structure].assign(candidate=lambda rows: [_candidate(r) for _, r in rows.iterrows()])
         errors = own.pivot_table(index="candidate", columns="sensors", values="error", sort=False)
@@ -179,7 +179,7 @@ def sensors_map(tables: Tables) -> Figure:
         for (i, j), value in np.ndenumerate(errors.to_numpy()):
             weight = "bold" if errors.index[i] in right else "normal"
             panel.text(j, i, f"{100.0 * value:.3g}", ha="center", va="center", fontsize=8.5, fontweight=weight)
-        page.frame_cells(panel, list(errors.index), [_and(str(c)) for c in errors.columns], 20.0)
+        page.frame_cells(panel, list(errors.index), [str(c).replace(" ", "\n") for c in errors.columns])
         panel.set_xlabel("sensors")
     page.letter(axes, [s.replace("_", " ") for s in structures])
     return figure

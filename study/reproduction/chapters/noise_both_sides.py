@@ -73,6 +73,8 @@ def make_noise(study: ClaimSettings, own: NoiseSettings, models: Path) -> Tables
     rows: list[dict[str, Any]] = []
     for force, used in ((RANDOM, own.estimators), (PERIODIC_FORCE, own.periodic_estimators)):
         for seed in range(own.first_seed, own.first_seed + own.seeds):
+            if force == PERIODIC_FORCE and seed >= own.first_seed + own.free_runs:
+                used = tuple(name for name in used if name not in ON_A_FREE_RUN)
             for cell in _noisy_records(model, study, own, force, seed):
                 rows += [{"force": force, "seed": seed, **row} for row in _found(model, cell, study, used)]
     table = _over_seeds(pd.DataFrame(rows), true_parameters(model.values))

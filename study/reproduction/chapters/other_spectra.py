@@ -191,7 +191,7 @@ def _recovered(
         failed = rows[~(rows["over_tolerance"] <= 1.0)]
         words = _words(name)
         at = rows.sort_values("over_tolerance").iloc[-1]
-        most = f"most {at['parameter']} of {named(str(at['system']))}, {ratio(at['over_tolerance'])} of its tolerance"
+        most = f"most {at['parameter']} of {named(str(at['system']))}, {ratio(at['over_tolerance'])} its tolerance"
         yield Condition(
             f"{words}: every parameter of all {len(rows)} systems within its tolerance",
             f"{words}: {len(rows) - len(failed)} of {len(rows)} systems, {most}", failed.empty,
