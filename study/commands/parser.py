@@ -12,6 +12,7 @@ from study.commands import (
     add,
     campaign,
     compare,
+    data,
     diagnose,
     drop,
     explore,
@@ -28,6 +29,7 @@ from study.support.errors import StudyError
 COMMANDS: tuple[Command, ...] = (
     compare.COMMAND, diagnose.COMMAND, plan.COMMAND, add.COMMAND, drop.COMMAND, history.COMMAND, explore.COMMAND,
     campaign.COMMAND, terms.COMMAND, simulate.COMMAND, export.COMMAND, trial.COMMAND,
+    data.COMMAND,
 )  # fmt: skip
 EXAMPLE = (
     "study compare rig.csv --model rig.yaml      # how good is the model, and where does it fail?\n"

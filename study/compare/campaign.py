@@ -224,7 +224,7 @@ def _coefficients(rig: str, rows: Sequence[Measured], by: By) -> list[document.B
 
 
 def _picture(
-    rig: str, rows: Sequence[Measured], levels: Sequence[across_levels.Level], by: By
+    rig: str, rows: Sequence[Measured], levels: Sequence[Level], by: By
 ) -> list[document.Block]:  # fmt: skip
     """The coefficients that were fitted against record, level or day; none where there is no such order."""
     from study.compare.campaign_picture import coefficients_picture

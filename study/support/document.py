@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import groupby
 from pathlib import Path, PurePosixPath
 
 from tabulate import tabulate
@@ -180,6 +181,7 @@ class PageSection:
     anchor: str
     title: str
     content: str  # HTML
+    part: str = ""  # of the page, under which that line has it
 
 
 def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
@@ -188,7 +190,11 @@ def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
         files("study.support").joinpath(f"picture_page.{kind}").read_text(encoding="utf-8").strip()
         for kind in ("css", "js")
     )
-    links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
+    links = "".join(
+        (f"<b>{html.escape(part)}</b>" if part else "")
+        + "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in own)
+        for part, own in groupby(sections, key=lambda s: s.part)
+    )
     body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
