@@ -85,7 +85,7 @@ def _diagnosed(
         unneeded_in_words,
     )
     from study.diagnose.needless import needless
-    from study.diagnose.user_candidates import check_on, unfitted
+    from study.diagnose.user_candidates import check_on, unfitted, unfitted_in_words
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
@@ -102,8 +102,8 @@ def _diagnosed(
     print(diagnosis_report.candidate_table(diagnosis))
     if table := diagnosis_report.set_table(diagnosis):
         print(f"\n{table}")
-    for effect, why in untried.items():
-        print(f"{effect} could not be fitted: {why}")
+    for sentence in unfitted_in_words(untried):
+        print(sentence)
     levels = levels_by_record(accounted.comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")

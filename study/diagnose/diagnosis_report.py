@@ -7,6 +7,7 @@ from tabulate import tabulate
 
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
+from study.equations.terms import LIBRARY
 from study.support.numbers import percent
 
 TIES = 2  # ties named in the table; the file names all
@@ -16,14 +17,21 @@ SHOWN = 8  # candidates in the table on the screen
 def candidate_table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     head = ["", "effect", "where", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
-    rows = [head, *(_shown(i, row) for i, row in enumerate(diagnosis.candidates[:SHOWN], start=1))]
+    listed = shown_rows(diagnosis)
+    rows = [head, *(_shown(number, row) for number, row in listed)]
     if not diagnosis.comparison.model.named:  # there is one place
         rows = [row[:2] + row[3:] for row in rows]
     shown = tabulate(rows[1:], rows[0], tablefmt="simple", disable_numparse=True)
-    more, unfitted = len(diagnosis.candidates) - SHOWN, diagnosis.asked - len(diagnosis.candidates)
+    more, unfitted = len(diagnosis.candidates) - len(listed), diagnosis.asked - len(diagnosis.candidates)
     said = [f"... and {more} more, in diagnosis.json"] if more > 0 else []
     said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to be fitted"] if unfitted else []
     return "\n".join([shown, "; ".join(said)]) if said else shown
+
+
+def shown_rows(diagnosis: Diagnosis) -> list[tuple[int, Ranked]]:
+    """The candidates that a table shows, each with its rank: the first, and all of the user's own."""
+    every = list(enumerate(diagnosis.candidates, start=1))
+    return every[:SHOWN] + [(number, row) for number, row in every[SHOWN:] if row.term.name not in LIBRARY]
 
 
 def _shown(number: int, row: Ranked) -> list[str]:

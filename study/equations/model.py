@@ -167,6 +167,7 @@ def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
             if name not in available:
                 known = ", ".join(sorted({*formulas.VARIABLES, *available}))
                 raise formulas.ExpressionError(
-                    f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi"
+                    f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi, and parameters behind "
+                    f"its name, as in '{entry.term.name}({name})', which are fitted"
                 )
     return model.channels

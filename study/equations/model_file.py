@@ -9,6 +9,7 @@ A file holds ``name`` and ``terms``; an entry of ``terms`` is a name, or a mappi
       - {term: dead_band, u_g: 0.0025}                   # shape parameter given
       - {term: periodic_stiffness, f_m: 1.0, amplitude: 177.7, phase: 0.0}
       - {term: bracket, force: "u*abs(u) + 0.1*v**3"}    # the user's own
+      - {term: friction(vs), force: "tanh(v/vs)"}        # the same, with a parameter that is fitted
 
 A structure has ``coordinates`` and ``forces`` as well, and each of its terms a place (``layout``).
 
@@ -106,8 +107,10 @@ def format_entry(entry: ModelTerm) -> str:
     for key, value in known.items():
         if not math.isfinite(value):
             raise StudyError(f"{key} of {entry.name} is {value}; only finite numbers can be written")
-    fields = {"term": scalar(entry.term.name)} | layout.place_fields(entry.place)
-    if entry.term.name not in terms.LIBRARY:
+    own_formula = entry.term.name not in terms.LIBRARY
+    fields = {"term": scalar(entry.term.heading if own_formula else entry.term.name)}
+    fields |= layout.place_fields(entry.place)
+    if own_formula:
         fields["force"] = json.dumps(entry.term.components[0].shape)
     parameters = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
     fields |= {name: repr(float(known[key])) for name, key in parameters.items() if key in known}
@@ -202,7 +205,7 @@ def entry_from(item: Mapping[object, object]) -> ModelTerm:
         if value is not None and value <= 0.0 and not parameter.signed:
             raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
     coefficients = _coefficients(term, item)
-    if name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
+    if term.name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
         raise StudyError(f"value of {name} is {coefficients[0]:g}; expected a mass above zero")
     return ModelTerm(term, coefficients, tuple(parameters))
 

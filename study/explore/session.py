@@ -265,10 +265,11 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
         name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
         formula = text
     term = custom(name.strip(), formula.strip())
-    known = ("u", "v", "t", *channels)
-    for used in formulas.names(formula.strip()):
+    known = ", ".join(("u", "v", "t", *channels))
+    for used in term.channels:
         uses = f"the expression {formula.strip()!r} uses the name {used!r}"
-        expect(used in known, f"{uses}; it may use {', '.join(known)}")
+        like = f"parameters to be fitted that are named before it, as in '{term.name}({used})={formula.strip()}'"
+        expect(used in channels, f"{uses}; it may use {known}, and {like}")
     expect(term.name not in taken, f"the name {term.name!r} is taken; expected another")
     return term
 

@@ -323,3 +323,35 @@ def test_the_measured_response_function_is_that_of_the_linear_system_within_its_
     off = np.abs(found.magnitude[0][inside] - found.magnitude[1][inside])
     assert 0.5 < np.mean(off < found.error[inside]) < 0.95
     assert np.all(found.coherence_predicted[inside] > 0.9)
+
+
+def test_the_users_own_candidate_is_shown_whatever_its_rank(found, monkeypatch):
+    from study.diagnose import diagnosis_report
+
+    monkeypatch.setattr(diagnosis_report, "SHOWN", 1)
+    rank = 1 + [c.name for c in found.candidates].index("bushing")
+    assert rank > 1
+    lines = found.table().splitlines()
+    assert any(line.split()[:2] == [str(rank), "bushing"] for line in lines)
+    assert "bushing" in found._repr_html_()
+
+
+def test_an_own_candidate_that_cannot_be_fitted_is_said(fit, record):
+    found = fit.diagnose({"wall": "exp(30000*u)"}, without=["hysteresis", "relaxation", "periodic_stiffness"])
+    assert list(found.not_fitted) == ["wall"]
+    assert "wall could not be fitted: " in found.says
+    with pytest.raises(st.StudyError, match=r"friction\(vs\)"):
+        fit.diagnose({"own": "tanh(v/vs)"})
+    with pytest.raises(st.StudyError, match="belongs to the library"):
+        fit.diagnose({"inertia": "u*v"})
+
+
+def test_a_parameter_of_an_own_formula_is_fitted():
+    hidden = st.Model(
+        st.term("inertia", value=1.0), st.term("linear_damping", value=3.0), st.term("linear_stiffness", value=355.0),
+        st.term("brake(vs)", force="tanh(v/vs)", value=0.5, vs=0.02), name="braked",
+    )  # fmt: skip
+    record = st.simulate(hidden, st.gaussian(1.0, samples=2048, seed=5), name="braked")
+    found = hidden.drop("brake").free().fit(record, measurement=False).diagnose({"own(vs)": "tanh(v/vs)"})
+    assert found["own"].ranked.effect.parameters["vs"] == pytest.approx(0.02, rel=0.02)
+    assert found["own"].coefficient == pytest.approx(0.5, rel=0.02)
