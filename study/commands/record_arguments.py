@@ -63,6 +63,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="column of force, displacement, velocity, acceleration, time, or of a further channel; by name or number",
     )  # fmt: skip
     reading.add_argument("--unit", action="append", default=[], metavar="ROLE=UNIT", help="such as force=kN")
+    reading.add_argument(
+        "--scale", action="append", default=[], metavar="ROLE=FACTOR",
+        help="factor on the numbers of a column: -1 for a force of the wrong sign; --unit is then that of the product",
+    )  # fmt: skip
     rate = reading.add_mutually_exclusive_group()
     rate.add_argument("--fs", type=finite_number(above=0.0), help="sampling rate in Hz, if there is no column of times")
     rate.add_argument("--dt", type=finite_number(above=0.0), help="sampling interval in s, instead of --fs")
@@ -145,9 +149,23 @@ def given_options(arguments: argparse.Namespace, group: str | None = None) -> "R
     return ReadOptions(
         {role: int(name) if name.isdecimal() and len(name) < DIGITS else name for role, name in columns.items()},
         assignments(arguments.unit, "--unit"),
+        scale=_factors(arguments.scale),
         group=group if group is not None or not groups else groups[0],
         **{name: getattr(arguments, name) for name in GIVEN},
     )
+
+
+def _factors(texts: "Sequence[str]") -> dict[str, float]:
+    """What ``--scale`` gives, as numbers."""
+    from study.records.readers import assignments
+
+    factors: dict[str, float] = {}
+    for role, text in assignments(texts, "--scale").items():
+        try:
+            factors[role] = float(text)
+        except ValueError:
+            raise StudyError(f"--scale {role}={text} is no number; expected a factor such as {role}=-1") from None
+    return factors
 
 
 def read_records(arguments: argparse.Namespace, model: "Model") -> list["Record"]:

@@ -13,10 +13,8 @@ from study.equations.term import QUANTITIES, Search, ShapeParameter
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import shown
 
-HEADING = re.compile(r"([^()]*)(?:\(([^()]*)\))?")
-MOST = 3  # parameters of one formula: the search tries all combinations of their values
+HEADED = re.compile(r"([^()]*)(?:\(([^()]*)\))?")
 RESERVED = (*formulas.VARIABLES, "pi", "z", "term", "force", "value", "values", "start", "at", "between", "couples")
-DRAWN = (0.1, 1.0)  # of a trial, which draws no formula of a user
 SEARCHES = {  # where a parameter of each quantity is looked for along the motion
     "velocity": Search("shares of the velocity", (0.03, 0.1, 0.3, 0.7, 1.5)),
     "length": Search("quantiles of |u|", (0.1, 0.3, 0.5, 0.7, 0.9)),
@@ -35,7 +33,7 @@ def name_and_parameters(heading: str) -> tuple[str, tuple[str, ...]]:
     StudyError
         If it is not of this form.
     """
-    found = HEADING.fullmatch(heading)
+    found = HEADED.fullmatch(heading)
     if found is None:
         raise StudyError(f"{shown(heading)} is no name of a term; expected one such as 'bracket' or 'friction(vs)'")
     listed = [] if found[2] is None else [name.strip() for name in found[2].split(",")]
@@ -57,14 +55,15 @@ def parameters_of(names: Sequence[str], formula: str) -> tuple[ShapeParameter, .
         expect(not taken, f"the parameter {name!r} has a name that means something else; expected one such as 'vs'")
         expect(names.count(name) == 1, f"the parameter {name!r} is listed twice; expected once")
         expect(name in used, f"the formula {formula!r} lacks its parameter {name!r}; it uses {', '.join(used)}")
-    expect(len(names) <= MOST, f"{len(names)} parameters are listed; at most {MOST} are searched together")
+    # the search tries all combinations of their values
+    expect(len(names) <= 3, f"{len(names)} parameters are listed; at most 3 are searched together")
     channels = dict.fromkeys(set(used) - set(names) - set(formulas.VARIABLES), dimensions.NONE)
     possible = [dict(zip(names, quantities, strict=True)) for quantities in product(SEARCHES, repeat=len(names))]
     for angle in (False, True):  # a sine of u, where that is an angle, is not of a number
         for quantity in possible:
             known = channels | {name: QUANTITIES[q] for name, q in quantity.items()}
             if dimensions.agrees(formula, known, angle=angle):
-                return tuple(ShapeParameter(n, q, f"{q} {n}", SEARCHES[q], DRAWN) for n, q in quantity.items())
+                return tuple(ShapeParameter(n, q, f"{q} {n}", SEARCHES[q], (0.1, 1.0)) for n, q in quantity.items())
     raise StudyError(
         f"the formula {formula!r} does not tell what {' and '.join(names)} is; expected what it is divided by, added "
         "to or multiplied with to make it a velocity, a length, one over a length, a time, a frequency or a number"

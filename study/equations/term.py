@@ -22,6 +22,7 @@ class Component:
 Places = Literal[
     "quantiles of |u|", "quantiles of u", "times of the motion", "per amplitude", "shares of the one before",
     "shares of the velocity", "lines of the modulation", "lines of the residual", "pitches of the residual",
+    "numbers",
 ]  # fmt: skip
 
 

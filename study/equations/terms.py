@@ -286,8 +286,9 @@ def find_terms(word: str) -> tuple[Term, ...]:
 def custom(heading: str, force: str) -> Term:
     """A user's own term: ``force`` is a formula of u, v, t and the names of extra measured channels.
 
-    Its parameters, which are fitted, are named behind its name: ``friction(vs)`` with ``tanh(v/vs)``. u, v, t and pi are displacement, velocity, time and the number, even where a channel is called so. The term has no
-    state: z is a channel like any other.
+    Its parameters, which are fitted, are named behind its name: ``friction(vs)`` with ``tanh(v/vs)``. u, v, t and
+    pi are displacement, velocity, time and the number, even where a channel is called so. The term has no state: z is a
+    channel like any other.
     """
     name, listed = name_and_parameters(heading)
     if name in LIBRARY:

@@ -23,7 +23,6 @@ from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
-from study.equations import formulas
 from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, Term, custom
 from study.explore.by_record import ByRecord, Several, by_record

@@ -18,6 +18,7 @@ from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
+from study.records.readers.remarks import LEAVING_OUT
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 from study.support.errors import expect
@@ -53,7 +54,9 @@ def made_ready(
     anew = ANEW if len(model.coordinates) > 1 else 0.0
     prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew))
     lacks = _unseen(model, prepared)
-    prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
+    noticed = [f"{r.name}: {remark}" if len(records) > 1 else remark for r in records for remark in r.remarks
+               if not (layout.use and LEAVING_OUT in remark)]  # fmt: skip
+    prepared = replace(prepared, notes=(*said, *noticed, *prepared.notes, *lacks))
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 
 

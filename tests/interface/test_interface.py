@@ -336,7 +336,7 @@ def test_the_users_own_candidate_is_shown_whatever_its_rank(found, monkeypatch):
     assert "bushing" in found._repr_html_()
 
 
-def test_an_own_candidate_that_cannot_be_fitted_is_said(fit, record):
+def test_an_own_candidate_that_cannot_be_fitted_is_said(fit):
     found = fit.diagnose({"wall": "exp(30000*u)"}, without=["hysteresis", "relaxation", "periodic_stiffness"])
     assert list(found.not_fitted) == ["wall"]
     assert "wall could not be fitted: " in found.says
