@@ -110,6 +110,16 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="integrate measured accelerations above this frequency and judge nothing below (default: from the record)",
     )  # fmt: skip
 
+    judging.add_argument(
+        "--near", type=finite_number(above=0.0), metavar="HZ",
+        help="of a record that shows several modes, the one near this frequency: the fit of a single mass begins there",
+    )  # fmt: skip
+
+    judging.add_argument(
+        "--up-to", type=finite_number(above=0.0), metavar="HZ",
+        help="use what lies below this frequency alone, where a record shows modes that the model does not have",
+    )  # fmt: skip
+
 
 def span(text: str) -> Span:
     """``40650:127400`` as first sample and the one after the last; an end left out is that of the record."""
@@ -192,7 +202,15 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
     alternate = arguments.judge == ALTERNATE
     fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)
     return Layout(
-        tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff, arguments.as_sampled
+        tuple(arguments.use),
+        fit,
+        judge,
+        alternate,
+        arguments.response,
+        arguments.cutoff,
+        arguments.near,
+        arguments.up_to,
+        arguments.as_sampled,
     )
 
 

@@ -4,7 +4,7 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -249,4 +249,5 @@ def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions", m
             )
         title, unit = split_unit(heading)
         columns.append(Column(title, array.astype(np.float64), unit))
-    return not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, roles), options)
+    made = not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, roles), options)
+    return replace(made, name=name) if name == "record" else made  # a file of this name is called after its folder

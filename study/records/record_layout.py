@@ -38,6 +38,8 @@ class Layout:
     alternate: bool = False  # whether every other block is judged
     response: str | None = None  # the measured motion that free runs are held against
     cutoff: float | None = None  # hertz above which a measured acceleration is integrated
+    near: float | None = None  # hertz near which the mode lies that is meant, where the record shows several
+    highest: float | None = None  # hertz above which nothing is used
     as_sampled: bool = False  # whether all samples are used, though the motion asks for fewer
 
     @property
