@@ -40,7 +40,7 @@ def climb(
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
     together = accounted_together(arguments, first, read_records(arguments, first), records[0])
-    session = sessions.begin_with(together.comparison)
+    session = sessions.begin_with(together)
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")
         if diagnosis.answer is None or number == steps or _in_a_circle(session, diagnosis.answer):

@@ -17,9 +17,8 @@ from study.commands.record_arguments import (
 )
 
 if TYPE_CHECKING:
-    from study.compare.comparison import Comparison
+    from study.diagnose.confirmed_faults import Diagnosed
     from study.diagnose.needless import Needless
-    from study.diagnose.verdict import Diagnosis
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
@@ -115,12 +114,10 @@ def _diagnosed(
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
     files = diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
-    return files | (_page(accounted.comparison, diagnosis, unneeded) if model.named else {})
+    return files | (_page(found, unneeded) if model.named else {})
 
 
-def _page(
-    comparison: "Comparison", diagnosis: "Diagnosis", unneeded: "tuple[Needless, ...]"
-) -> dict[str, bytes]:  # fmt: skip
+def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
     """What is missing of a structure, and where, to be looked at place by place; none without what draws it."""
     from study.support.extras import lacking
 
@@ -128,7 +125,7 @@ def _page(
         return {}
     from study.explore.saved import of_diagnosis
 
-    return {PAGE: of_diagnosis(comparison, diagnosis, unneeded)}
+    return {PAGE: of_diagnosis(found, unneeded)}
 
 
 COMMAND = Command(

@@ -72,7 +72,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     comparisons = [a.comparison for a in own]
     several = Several(tuple(c.prepared for c in comparisons), tuple(records), separate)
     known = of_own(comparisons) if own else by_record(several, found.comparison) if separate else None
-    return sessions.begin_with(found.comparison, earlier=steps, several=several, known=known)
+    return sessions.begin_with(found, earlier=steps, several=several, known=known)
 
 
 def _ready(address: str, browser: bool) -> None:

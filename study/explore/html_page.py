@@ -105,7 +105,7 @@ def template() -> Template:
 def variables(session: Session, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
     now = session.now
-    record, model = session.prepared.record.name, now.model.name
+    record, model = now.comparison.record.name, now.model.name
     above, below = cards_of(now.comparison)
     return {
         "record": record, "model": model, "title": f"{record}: {model}", "live": live, "style": _text("page.css"),

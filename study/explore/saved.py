@@ -11,14 +11,15 @@ from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
 
 from study.compare.comparison import Comparison
+from study.diagnose.confirmed_faults import Diagnosed
 from study.diagnose.needless import Needless
-from study.diagnose.verdict import Diagnosis
 from study.explore import html_page
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
 from study.explore.html_page import ROOT, Page, template
 from study.explore.session import Session, begin_with, with_diagnosis, with_stage
 from study.explore.view import View
+from study.faults.accounting import Accounted
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
@@ -71,13 +72,13 @@ def as_file(made: Page, values: Mapping[str, Any]) -> bytes:
 
 def of_comparison(comparison: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
-    return saved(begin_with(comparison))
+    return saved(begin_with(Accounted.as_compared(comparison)))
 
 
-def of_diagnosis(comparison: Comparison, diagnosis: Diagnosis, unneeded: tuple[Needless, ...]) -> bytes:
+def of_diagnosis(found: Diagnosed, unneeded: tuple[Needless, ...]) -> bytes:
     """The same of a comparison and its diagnosis, and the terms that the model does not need."""
-    session = begin_with(comparison)
-    return saved(with_stage(session, with_diagnosis(replace(session.now, unneeded=unneeded), diagnosis)))
+    session = begin_with(found.accounted)
+    return saved(with_stage(session, with_diagnosis(replace(session.now, unneeded=unneeded), found)))
 
 
 def _in_script(content: object) -> str:

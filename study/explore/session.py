@@ -17,8 +17,8 @@ from study.compare.missing_force import Unbalanced, unbalanced
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import FittedCandidate, Progress
+from study.diagnose.confirmed_faults import Diagnosed, diagnose_accounted
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
-from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
@@ -26,6 +26,7 @@ from study.diagnose.verdict import Diagnosis, search_base
 from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, Term, custom
 from study.explore.by_record import ByRecord, Several, by_record
+from study.faults.accounting import Accounted
 from study.records.prepared import Prepared
 from study.records.record_layout import records_judged
 from study.records.sampling_rate import without_spare_samples
@@ -43,7 +44,7 @@ class Stage:
     model: Model  # values that it gives are held
     label: str  # what was done to arrive at it
     added: str | None  # the term that is new in it, by effect and place
-    comparison: Comparison
+    accounted: Accounted  # the comparison, and the faults that its record is corrected for
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
     # what the equations would leave on each record with a candidate in the model, by its name
@@ -52,6 +53,11 @@ class Stage:
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
     on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
     by_record: ByRecord | None = None  # coefficients of each record's own; None as long as nobody has asked
+
+    @property
+    def comparison(self) -> Comparison:
+        """The model beside the record as it is corrected."""
+        return self.accounted.comparison
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
@@ -70,7 +76,6 @@ class Stage:
 class Session:
     """A record, and the models tried on it."""
 
-    prepared: Prepared
     stages: tuple[Stage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
@@ -96,19 +101,19 @@ def joined(earlier: Sequence[Step], own: Sequence[Step]) -> list[Step]:
 
 def begin(model: Model, prepared: Prepared, *, earlier: Sequence[Step] = ()) -> Session:
     """A session with the model as given, on the samples that the record's motion asks for."""
-    return begin_with(compare(model, without_spare_samples(prepared)), earlier=earlier)
+    return begin_with(Accounted.as_compared(compare(model, without_spare_samples(prepared))), earlier=earlier)
 
 
 def begin_with(
-    comparison: Comparison, *, earlier: Sequence[Step] = (), several: Several = NONE, known: ByRecord | None = None
+    accounted: Accounted, *, earlier: Sequence[Step] = (), several: Several = NONE, known: ByRecord | None = None
 ) -> Session:
     """A session with the model as it was compared, on the record, or records, as corrected for that.
 
     ``known`` are the coefficients of each of several records.
     """
-    comparison = _named_after_all(comparison)
-    first = replace(stage_of(comparison, "as given", None), by_record=known)
-    return Session(comparison.prepared, (first,), earlier=tuple(earlier), several=several)
+    accounted = replace(accounted, comparison=_named_after_all(accounted.comparison))
+    first = replace(stage_of(accounted, "as given", None), by_record=known)
+    return Session((first,), earlier=tuple(earlier), several=several)
 
 
 def _named_after_all(comparison: Comparison) -> Comparison:
@@ -121,17 +126,20 @@ def _named_after_all(comparison: Comparison) -> Comparison:
     return replace(comparison, prepared=replace(prepared, record=together))
 
 
-def stage_of(comparison: Comparison, label: str, added: str | None, dropped: str | None = None) -> Stage:
+def stage_of(accounted: Accounted, label: str, added: str | None, dropped: str | None = None) -> Stage:
     """A model as it was compared, which nobody has diagnosed."""
     each: tuple[Comparison, ...] = ()
     with suppress(StudyError):  # one may be too short to be judged by itself: then all are shown as one
-        each = on_each_record(comparison)
-    return Stage(comparison.model, label, added, comparison, dropped=dropped, on_each=each)
+        each = on_each_record(accounted.comparison)
+    return Stage(accounted.comparison.model, label, added, accounted, dropped=dropped, on_each=each)
 
 
-def climbed(session: Session, comparison: Comparison, label: str, added: str | None) -> Session:
+def climbed(
+    session: Session, comparison: Comparison, label: str, added: str | None, dropped: str | None = None
+) -> Session:
     """The session with a model more."""
-    return replace(session, stages=(*session.stages, stage_of(comparison, label, added)))
+    stage = stage_of(replace(session.now.accounted, comparison=comparison), label, added, dropped)
+    return replace(session, stages=(*session.stages, stage))
 
 
 def undone(session: Session) -> Session:
@@ -164,22 +172,22 @@ def dropped(session: Session, name: str) -> Session:
     """
     now = session.now
     comparison = dropping.compared_without(now.comparison, dropping.term_at(now.model, name))
-    return replace(session, stages=(*session.stages, stage_of(comparison, f"- {name}", None, dropped=name)))
+    return climbed(session, comparison, f"- {name}", None, dropped=name)
 
 
 def on_record(stage: Stage, number: int) -> Stage:
     """A stage of several records as one of them shows it; that of one record as it is."""
     if not stage.on_each:
         return stage
-    comparison, diagnosis = stage.on_each[number], stage.diagnosis
+    accounted, diagnosis = replace(stage.accounted, comparison=stage.on_each[number]), stage.diagnosis
     if diagnosis is not None:
         candidates, sets = (
-            tuple(replace(row, prediction=row.prediction.along(comparison.prepared)) for row in rows)
+            tuple(replace(row, prediction=row.prediction.along(accounted.comparison.prepared)) for row in rows)
             for rows in (diagnosis.candidates, diagnosis.sets)
         )
         diagnosis = replace(diagnosis, candidates=candidates, sets=sets)
     would = {name: (lacking[number],) for name, lacking in stage.would.items()}
-    return replace(stage, comparison=comparison, diagnosis=diagnosis, would=would)
+    return replace(stage, accounted=accounted, diagnosis=diagnosis, would=would)
 
 
 def by_itself(session: Session) -> Session:
@@ -207,22 +215,31 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
     alone = key == "m" and len(model.terms) == 1
     expect(hold or not alone, "m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
     changed = model.with_values({**model.values, key: known[key] if hold else None})
-    return climbed(session, compare(changed, session.prepared, start=known), f"{key} {done}", None)
+    return climbed(session, compare(changed, session.now.comparison.prepared, start=known), f"{key} {done}", None)
 
 
 def examined(session: Session, progress: Progress | None = None) -> tuple[Stage, Diagnosis]:
     """The present stage with what is missing and what is not needed, in words too, and what each candidate would leave.
 
-    And the diagnosis.
+    And the diagnosis. Where the record shows other faults beside what is missing, the stage is that of the record as it
+    is corrected for these.
     """
-    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
-    return with_diagnosis(weighed(session).now, diagnosis), diagnosis
+    now = session.now
+    found = diagnose_accounted(now.accounted, extra=session.own, progress=progress)
+    if found.accounted.comparison is not now.comparison:
+        corrected = stage_of(found.accounted, now.label, now.added, now.dropped)
+        session = replace(session, stages=(*session.stages[:-1], replace(corrected, by_record=now.by_record)))
+    return with_diagnosis(weighed(session).now, found), found.diagnosis
 
 
-def with_diagnosis(stage: Stage, diagnosis: Diagnosis) -> Stage:
+def with_diagnosis(stage: Stage, found: Diagnosed) -> Stage:
     """A stage whose terms were weighed with its diagnosis, in words too, and what each candidate would leave."""
-    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(stage.unneeded or (), diagnosis)}".strip()
-    return _foreseen(replace(stage, diagnosis=diagnosis, said=said))
+    words = (
+        diagnosis_in_words(found.diagnosis),
+        *(fault.says for fault in found.faults),
+        unneeded_in_words(stage.unneeded or (), found.diagnosis),
+    )
+    return _foreseen(replace(stage, diagnosis=found.diagnosis, said=" ".join(said for said in words if said)))
 
 
 def _foreseen(stage: Stage) -> Stage:
@@ -245,12 +262,9 @@ def _left_with(row: Ranked, comparison: Comparison) -> Unbalanced:
 def with_stage(session: Session, stage: Stage) -> Session:
     """The session with a diagnosed stage in place of those of its model; unchanged if that was undone meanwhile."""
     stages = (
-        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would, unneeded=stage.unneeded,
-                by_record=stage.by_record)
-        if r.model == stage.model
-        else r
+        replace(stage, label=r.label, added=r.added, dropped=r.dropped) if r.model == stage.model else r
         for r in session.stages
-    )  # fmt: skip
+    )
     return replace(session, stages=tuple(stages))
 
 
@@ -285,7 +299,7 @@ def tried(session: Session, text: str) -> Session:
     """
     now = session.now
     taken = {t.name for t in session.own} | {t.term.name for t in now.model.terms}
-    term = own_term(text, taken, session.prepared.record.extra)
+    term = own_term(text, taken, session.now.comparison.record.extra)
     if now.model.named:
         return replace(session, own=(*session.own, term))
     if now.diagnosis is None:
@@ -297,7 +311,7 @@ def tried(session: Session, text: str) -> Session:
             attempt = candidates.attempt(free(term), search_base(now.comparison))
             if attempt is None:
                 raise StudyError(silent)
-            rows = rank([*known, *candidates.all_settled([attempt], session.prepared)], now.comparison)
+            rows = rank([*known, *candidates.all_settled([attempt], now.comparison.prepared)], now.comparison)
     except np.linalg.LinAlgError:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))

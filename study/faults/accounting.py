@@ -54,6 +54,11 @@ class Accounted:
     switched_off: tuple[str, ...]  # faults that are not looked for
     as_sampled: bool  # whether all samples are used
 
+    @classmethod
+    def as_compared(cls, comparison: Comparison) -> "Accounted":
+        """A comparison with a record that is taken as it is: no faults are looked for."""
+        return cls(comparison, (), comparison.prepared, {}, tuple(FAULTS), as_sampled=True)
+
     def faults_beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
         """The faults that the record shows beside a fuller model, which begins at a fit of it."""
         return _corrected(model, self.given, self.known, self.switched_off, self.as_sampled, near=fit).faults

@@ -5,10 +5,9 @@ import pytest
 from study import cli, trials
 from study.commands import climb
 from study.compare import history
-from study.diagnose import verdict
+from study.diagnose import confirmed_faults, verdict
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY
-from study.explore import session as sessions
 from study.explore.saved_files import PAGE
 from study.records.record import write_csv
 
@@ -18,9 +17,9 @@ TRIED = ("quadratic_damping", "cubic_damping", "quadratic_stiffness", "cubic_sti
 
 @pytest.fixture
 def few(monkeypatch):
-    original, others = sessions.diagnose_as_read, [name for name in LIBRARY if name not in TRIED]
+    original, others = confirmed_faults.diagnose_as_read, [name for name in LIBRARY if name not in TRIED]
     monkeypatch.setattr(
-        sessions, "diagnose_as_read", lambda c, **options: original(c, **{"without": others, **options})
+        confirmed_faults, "diagnose_as_read", lambda c, **options: original(c, **{"without": others, **options})
     )
 
 
@@ -169,7 +168,7 @@ def test_a_climb_goes_forwards_and_backwards(rig, capsys):
 def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
     """A diagnosis that asks for what was just taken out, again and again, ends the climb."""
     (rig / "rig.yaml").write_text((rig / "rig.yaml").read_text() + "  - quadratic_stiffness\n")
-    original = sessions.diagnose_as_read
+    original = confirmed_faults.diagnose_as_read
 
     def stubborn(comparison, **options):
         found = original(comparison, **options)
@@ -179,7 +178,7 @@ def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
         return verdict.Diagnosis(**{**vars(found), "verdict": verdict.MISSING if first else found.verdict,
                                     "candidates": shown, "sets": shown[:1]})  # fmt: skip
 
-    monkeypatch.setattr(sessions, "diagnose_as_read", stubborn)
+    monkeypatch.setattr(confirmed_faults, "diagnose_as_read", stubborn)
     steps = climb.climb([rig / "rig.csv"], rig / "rig.yaml", [], 6, rig / "out")
     assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- quadratic_stiffness"]
     assert "the climb ends" in capsys.readouterr().out

@@ -14,6 +14,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.force_map import curve, surface
 from study.compare.links import power_in_blocks, times_of_blocks, visits_in_blocks
 from study.diagnose.adding import added
+from study.diagnose.confirmed_faults import Diagnosed
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
@@ -99,7 +100,7 @@ def test_an_added_term_is_what_add_would_have_found(grown):
     error = grown.now.comparison.prediction.error
     after = added(grown.stages[0].comparison, get("quadratic_damping"))
     assert error == pytest.approx(after.prediction.error, rel=1e-3)
-    anew = compare(grown.now.model, grown.prepared)
+    anew = compare(grown.now.model, grown.now.comparison.prepared)
     assert error == pytest.approx(anew.prediction.error, rel=1e-3)
 
 
@@ -246,10 +247,11 @@ def test_the_saved_page_stays_small_however_long_record_and_history(asked):
 
 def test_what_a_user_named_cannot_leave_its_place(asked):
     evil = "</script><script>alert(1)</script>"
-    record = asked.prepared.record
-    prepared = replace(asked.prepared, record=replace(record, name=evil, units={**record.units, "force": "<b>N"}))
-    now = replace(asked.now, comparison=replace(asked.now.comparison, prepared=prepared))
-    hostile = saved(replace(asked, prepared=prepared, stages=(now,))).decode()
+    comparison = asked.now.comparison
+    record = comparison.record
+    prepared = replace(comparison.prepared, record=replace(record, name=evil, units={**record.units, "force": "<b>N"}))
+    accounted = replace(asked.now.accounted, comparison=replace(comparison, prepared=prepared))
+    hostile = saved(replace(asked, stages=(replace(asked.now, accounted=accounted),))).decode()
     assert "alert(1)</script>" not in hostile
     assert "<b>N" not in hostile
     assert "&lt;b&gt;N" in hostile or "\\u003cb>N" in hostile
@@ -272,7 +274,8 @@ def test_the_missing_force_has_one_unit_everywhere(asked):
     record = comparison.record.with_channels({"force": comparison.record["force"] * factor})
     prepared = replace(comparison.prepared, record=record)
     lacking = replace(lacking, force=lacking.force * factor)
-    weak = replace(stage, comparison=replace(comparison, prepared=prepared, missing_force=lacking))
+    changed = replace(comparison, prepared=prepared, missing_force=lacking)
+    weak = replace(stage, accounted=replace(stage.accounted, comparison=changed))
     (small, scale), (usual, one) = (
         (view.of_place(""), view.focus("displacement", "").force.factor) for view in (View(weak, 0), View(stage, 0))
     )
@@ -299,7 +302,7 @@ def test_a_set_of_effects_is_a_row_whose_click_adds_all_of_it(asked):
     first, second = asked.now.diagnosis.candidates[:2]
     both = replace(first, entries=first.entries + second.entries, effects=first.effects + second.effects, tied_with=())
     diagnosis = replace(asked.now.diagnosis, verdict="missing_effects", sets=(both,))
-    stage = sessions.with_diagnosis(replace(asked.now, would={}), diagnosis)
+    stage = sessions.with_diagnosis(replace(asked.now, would={}), Diagnosed(diagnosis, asked.now.accounted, ()))
     assert [row.name for row in stage.shown[:2]] == [both.name, first.name]
     assert both.name in stage.would
     said = words.words(stage, 0, True)

@@ -44,7 +44,7 @@ def begun(kind: str) -> sessions.Session:
             else trials.make_trial(4, ["dead_band"])
         )
         believed, record = trial.believed, trial.record.part(0, min(4000, len(trial.record)))
-    return sessions.begin_with(compare_records([record], believed).comparison)
+    return sessions.begin_with(compare_records([record], believed))
 
 
 def _component() -> Record:

@@ -18,6 +18,7 @@ from study.explore.live import Watcher
 from study.explore.saved import saved
 from study.explore.saved_files import PAGE, files
 from study.explore.view import View
+from study.faults.accounting import Accounted
 from study.faults.fault import NOTHING_ASKED, FaultSettings
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
@@ -31,7 +32,7 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 def begun(hall):
     model = model_file.read_model(hall / "frame.yaml")
     prepared = prepare_record(read_record(hall / "frame.csv", roles=model.roles))
-    return sessions.begin_with(compare(model, prepared))
+    return sessions.begin_with(Accounted.as_compared(compare(model, prepared)))
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,7 @@ def test_a_place_whose_motion_no_sensor_shows_says_so(hall):
     model = model_file.read_model(hall / "frame.yaml")
     record = read_record(hall / "frame.csv", roles=model.roles)
     blind = record.with_motions({s: x for s, x in record.motions.items() if s.coordinate != "floor2"})
-    session = sessions.begin_with(compare(model, prepare_record(blind)))
+    session = sessions.begin_with(Accounted.as_compared(compare(model, prepare_record(blind))))
     view = View(session.now, 0)
     assert view.sensors == ("floor1 displacement", "floor3 displacement")
     for label, place in view.places.items():
@@ -135,7 +136,7 @@ def test_faults_of_the_measurement_are_corrected_and_said_or_left_alone(hall):
     faulty = record.with_motions(late).part(10, len(record))
     notes: list[str] = []
     for settings in (FaultSettings(), NOTHING_ASKED):
-        session = sessions.begin_with(compare_records([faulty], model, settings=settings).comparison)
+        session = sessions.begin_with(compare_records([faulty], model, settings=settings))
         said = View(session.now, 0).of_record(session)["words"]
         notes.append(dict(zip(*said.values(), strict=True))["notes"])
     assert "floor2" in notes[0]
@@ -183,7 +184,7 @@ def test_several_records_of_a_structure_are_shown_one_by_one(hall):
     model = model_file.read_model(hall / "frame.yaml")
     whole = read_record(hall / "frame.csv", roles=model.roles)
     parts = [replace(whole.part(*span), name=name) for name, span in (("first", (0, 800)), ("then", (800, 1600)))]
-    session = sessions.begin_with(compare_records(parts, model).comparison)
+    session = sessions.begin_with(compare_records(parts, model))
     assert [c.record.name for c in session.now.on_each] == ["first", "then"]
     for number, name in enumerate(("first", "then")):
         view = View(session.now, 0, record=number)

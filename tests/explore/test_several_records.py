@@ -12,6 +12,7 @@ from study.compare import panels
 from study.compare.comparison import across_records, compare, on_each_record
 from study.compare.each_record import separated
 from study.compare.prediction import predict
+from study.diagnose import confirmed_faults
 from study.diagnose.force_between import diagnose_as_read
 from study.equations import model_file
 from study.equations.model import Model, free
@@ -52,14 +53,14 @@ def records() -> list[Record]:
 def begun(records: list[Record]) -> sessions.Session:
     own = [compare_records([record], BELIEVED).comparison for record in records]
     several = Several(tuple(c.prepared for c in own), tuple(records))
-    return sessions.begin_with(compare_records(records, BELIEVED).comparison, several=several, known=of_own(own))
+    return sessions.begin_with(compare_records(records, BELIEVED), several=several, known=of_own(own))
 
 
 @pytest.fixture(scope="module")
 def grown(begun: sessions.Session) -> sessions.Session:
     few = partial(diagnose_as_read, without=[n for n in LIBRARY if n not in ("cubic_stiffness", "quadratic_damping")])
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(sessions, "diagnose_as_read", few)
+        patched.setattr(confirmed_faults, "diagnose_as_read", few)
         asked = sessions.with_stage(begun, sessions.examined(begun)[0])
     return sessions.by_itself(sessions.with_added(asked, "cubic_stiffness"))
 
@@ -209,9 +210,9 @@ def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path, page):
 
 def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     model, marked, separate = separated(BELIEVED, records, ["linear_stiffness"])
-    together = compare_records(marked, model).comparison
+    together = compare_records(marked, model)
     several = Several((), tuple(records), separate)
-    session = sessions.begin_with(together, several=several, known=by_record(several, together))
+    session = sessions.begin_with(together, several=several, known=by_record(several, together.comparison))
     (level,) = session.now.by_record.levels
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
@@ -222,4 +223,4 @@ def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
         written = saved_files.files(session, "rig.yaml", text, values=values)["rig.yaml"].decode()
         assert "k_high" not in written
         assert written.count("term: ") == (3 if values else 0)
-    assert level.value[1] - level.value[0] == pytest.approx(together.fit.model.numbers()["k_high"], rel=1e-9)
+    assert level.value[1] - level.value[0] == pytest.approx(together.comparison.fit.model.numbers()["k_high"], rel=1e-9)

@@ -21,6 +21,7 @@ from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.explore import session as sessions
 from study.explore.view import View
+from study.faults.accounting import Accounted
 from study.identify.frequency_domain.subspace import observability
 from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
@@ -304,7 +305,7 @@ def test_the_force_that_is_missing_between_two_coordinates_is_told_through_the_m
 
 
 def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_forces(comparison):
-    session = sessions.begin_with(comparison)
+    session = sessions.begin_with(Accounted.as_compared(comparison))
     shown = View(session.now, 0)
     table = shown.of_record(session)["words"]
     words = dict(zip(table["place"], table["html"], strict=True))

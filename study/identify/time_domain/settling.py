@@ -42,7 +42,10 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     fine = with_enough_steps(fit, prepared)
     if not seen_everywhere(fit.model, prepared):
         return fine
-    return replace(from_the_motion(_settled(fine, prepared), prepared), elsewhere=fit.elsewhere)
+    best = from_the_motion(_settled(fine, prepared), prepared)
+    if best.restarts:  # a run that had lost the motion could not tell how many steps are enough
+        best = with_enough_steps(best, prepared)
+    return replace(best, elsewhere=fit.elsewhere)
 
 
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -102,9 +105,8 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows.
 
     Held ones count too, with the errors that they would have: what the integration does to them is left of the motion.
+    Segments are found anew with the steps that they need: the integration's error parts them as a wrong model does.
     """
-    if fit.restarts:  # multiple shooting has chosen them
-        return fit
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
     allowed = SHIFT if prepared.every == 1 else FINE
     while fit.steps_per_sample < most:
@@ -117,10 +119,20 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         if excess <= 1.0:
             break
         times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
-        fit = fit_part(
-            fit.model, prepared, fit.held, steps=min(times * fit.steps_per_sample, most),
-            initial=np.atleast_2d(fit.initial),
-        )  # fmt: skip
+        steps = min(times * fit.steps_per_sample, most)
+        if fit.restarts:
+            try:
+                finer = fit_in_segments(
+                    fit.model, prepared.record, held=fit.held, outputs=prepared.outputs, span=prepared.plan.fit,
+                    steps_per_sample=steps,
+                )  # fmt: skip
+            except DivergenceError:
+                break
+            if fit.converged and not finer.converged:
+                break
+            fit = finer
+        else:
+            fit = fit_part(fit.model, prepared, fit.held, steps=steps, initial=np.atleast_2d(fit.initial))
     return fit
 
 
