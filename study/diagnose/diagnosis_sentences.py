@@ -162,7 +162,7 @@ def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
 def _amount(effect: FittedEffect) -> str:
     """Coefficient and shape parameters with their errors."""
     low, high = effect.interval
-    digits = _digits(effect.coefficient, high - low)
+    digits = digits_between(effect.coefficient, high - low)
     said = f"{effect.coefficient:.{digits}g} {effect.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
     parts = [
         f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
@@ -171,7 +171,7 @@ def _amount(effect: FittedEffect) -> str:
     return f"{said}, with {', '.join(parts)}" if parts else said
 
 
-def _digits(value: float, width: float) -> int:
+def digits_between(value: float, width: float) -> int:
     """Significant digits that tell the ends of an interval apart, four at least."""
     if value == 0.0 or not 0.0 < width < math.inf:
         return 4

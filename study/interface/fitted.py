@@ -343,7 +343,8 @@ class Fit(FitPictures):
 def fitted(
     model: Model, record: Record | Sequence[Record], *, fit: Samples | None,
     judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
-    cutoff: float | None, near: float | None, up_to: float | None, estimator: str, measurement: Given | bool | None, as_sampled: bool,
+    cutoff: float | None, near: float | None, up_to: float | None, estimator: str,
+    measurement: Given | bool | None, as_sampled: bool,
     absolute: bool, each_record: Sequence[str],
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
@@ -355,7 +356,8 @@ def fitted(
     alternate = judge == "every-other-block"
     layout = Layout(
         tuple(_stretch(pair) for pair in use), _samples("fit", fit, records[0]),
-        None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, near, up_to, as_sampled,
+        None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, near, up_to,
+        as_sampled,
     )  # fmt: skip
     equation, asked = model.equation, list[measured.Record](distinct(records))
     if each_record:

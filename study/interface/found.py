@@ -92,7 +92,8 @@ class Candidate:
 
     def __repr__(self) -> str:
         """One line: name, what it explains, coefficient."""
-        amounts = ", ".join(f"{e.coefficient:.4g} +- {1.96 * e.error:.2g} {e.unit}" for e in self.ranked.effects)
+        effects = self.ranked.effects
+        amounts = ", ".join(diagnosis_report.shown_coefficient(e.coefficient, 1.96 * e.error, e.unit) for e in effects)
         return f"<Candidate {self.name}: explains {percent(self.explained, '.3g')}, {amounts}>"
 
 
@@ -189,8 +190,9 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         rows = [
-            [str(place), c.name, f"{percent(c.explained, 'z.1f')}", percent(c.error),
-             f"{c.coefficient:.4g} ± {1.96 * c.ranked.effect.error:.2g} {c.unit}", f"{c.p_value:.1g}"]
+            [str(place), c.name, diagnosis_report.explained_share(c.ranked.gain), percent(c.error),
+             diagnosis_report.shown_coefficient(c.coefficient, 1.96 * c.ranked.effect.error, c.unit),
+             f"{c.p_value:.1g}"]
             for place, c in ((n, Candidate(row)) for n, row in diagnosis_report.shown_rows(self.result))
         ]  # fmt: skip
         heads = ["", "effect", "explains", "error with it", "coefficient", "p"]

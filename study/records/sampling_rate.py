@@ -190,7 +190,7 @@ def decimated(record: Record, factor: int) -> Record:
     return replace(record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED)
 
 
-def limited(record: Record, highest: float) -> tuple[Record, str]:
+def low_passed(record: Record, highest: float) -> tuple[Record, str]:
     """A record without what lies above a frequency in hertz, and a sentence on that.
 
     Forces and motions go through one filter, which a linear equation does not see; what a nonlinear one makes above the

@@ -21,7 +21,7 @@ from study.records.prepared import Prepared
 from study.records.readers.remarks import LEAVING_OUT
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
-from study.records.sampling_rate import limited
+from study.records.sampling_rate import low_passed
 from study.support.errors import expect
 
 ANEW = 1.5  # periods of a structure's decay in a stretch: over more, several effects that are missing hide each other
@@ -51,7 +51,7 @@ def made_ready(
     """
     model, records, said = driven_alike(records, model, absolute)
     if layout.highest is not None:
-        below = [limited(record, layout.highest) for record in records]
+        below = [low_passed(record, layout.highest) for record in records]
         records, said = [record for record, _ in below], (*said, below[0][1])
     prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
     drifts = not (prescribed or model.modal or has_spring(model))
