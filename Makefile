@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture notebooks docs gallery readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -42,6 +42,9 @@ picture: $(READY)
 
 fault_pictures: $(READY)
 	$(BIN)/python scripts/fault_pictures.py models docs/faults
+
+report_picture: $(READY)
+	$(BIN)/python scripts/report_picture.py models docs/report.png
 
 notebooks: $(READY)
 	$(BIN)/python scripts/notebooks.py docs/notebooks/*.ipynb

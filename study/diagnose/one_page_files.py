@@ -40,9 +40,9 @@ def one_page_files(content: OnePage) -> dict[str, bytes]:
     with in_style():
         picture = Figure(figsize=(_Sheet.inner(), 2.5))
         draw(list(picture.subplots(1, 2, gridspec_kw={"wspace": 0.28}).flat), content)
-        picture.subplots_adjust(left=0.085, right=0.99, bottom=0.17, top=0.84)
+        picture.subplots_adjust(left=0.105, right=0.99, bottom=0.17, top=0.84)
         drawn = page.rendered(picture, "svg")
-        return {"report.html": as_html(content, drawn), "report.pdf": page.rendered(_sheet(content), "pdf")}
+        return {"report.html": as_html(content, drawn), "report.pdf": page.rendered(sheet(content), "pdf")}
 
 
 def draw(axes: Sequence[Axes], content: OnePage) -> None:
@@ -131,29 +131,29 @@ def _joined(notes: Sequence[str]) -> str:
     return " ".join(f"{note[0].upper()}{note[1:].rstrip('.')}." for note in notes)
 
 
-def _sheet(content: OnePage) -> Figure:
+def sheet(content: OnePage) -> Figure:
     """The page as a figure of the size of a sheet."""
-    sheet = _Sheet(Figure(figsize=(_Sheet.width, _Sheet.height)))
-    sheet.text(content.headline, 14.0, bold=True)
-    sheet.text(content.record)
-    sheet.heading("Equation")
-    sheet.text(dimensions.pretty(content.equation), slanted=True)
+    filled = _Sheet(Figure(figsize=(_Sheet.width, _Sheet.height)))
+    filled.text(content.headline, 14.0, bold=True)
+    filled.text(content.record)
+    filled.heading("Equation")
+    filled.text(dimensions.pretty(content.equation), slanted=True)
     if content.completed:
-        sheet.text(f"with it: {dimensions.pretty(content.completed)}", slanted=True)
-    sheet.heading("Errors before and after")
-    sheet.rows([("", "as given", "with what is missing"), *content.errors], (0.0, 3.0, 4.6))
-    sheet.heading("What is missing, and how sure that is")
-    sheet.text(dimensions.pretty(" ".join(content.says)))
-    sheet.down(0.12)
+        filled.text(f"with it: {dimensions.pretty(content.completed)}", slanted=True)
+    filled.heading("Errors before and after")
+    filled.rows([("", "as given", "with what is missing"), *content.errors], (0.0, 3.0, 4.6))
+    filled.heading("What is missing, and how sure that is")
+    filled.text(dimensions.pretty(" ".join(content.says)))
+    filled.down(0.12)
     listed = [tuple(dimensions.pretty(cell) for cell in row) for row in _first(content.coefficients)]
-    below = (len(listed) + 12) * sheet.size * sheet.leading / 72.0  # the table, and room for notes
-    draw(sheet.panels(min(max(sheet.at - sheet.margin - below - 0.65, 1.3), 3.2)), content)
-    sheet.heading("Coefficients")
-    sheet.rows([("", "term", "value", "95 % interval", "unit"), *listed], (0.0, 1.6, 3.4, 4.3, 6.1))
-    sheet.down(0.1)
-    sheet.text(_joined(content.notes), 7.0, colour="0.3", until=sheet.margin)
-    sheet.figure.text(sheet.margin / sheet.width, 0.45 / sheet.height, content.version, fontsize=7.0, color="0.3")
-    return sheet.figure
+    below = (len(listed) + 12) * filled.size * filled.leading / 72.0  # the table, and room for notes
+    draw(filled.panels(min(max(filled.at - filled.margin - below - 0.65, 1.3), 3.2)), content)
+    filled.heading("Coefficients")
+    filled.rows([("", "term", "value", "95 % interval", "unit"), *listed], (0.0, 1.6, 3.4, 4.3, 6.1))
+    filled.down(0.1)
+    filled.text(_joined(content.notes), 7.0, colour="0.3", until=filled.margin)
+    filled.figure.text(filled.margin / filled.width, 0.45 / filled.height, content.version, fontsize=7.0, color="0.3")
+    return filled.figure
 
 
 class _Sheet:
