@@ -40,9 +40,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
     add_each_record_argument(parser)
     add_diagnosis_arguments(parser)
-    parser.add_argument(
-        "--each", action="store_true", help="of several records, a verdict each, not one on all of them"
-    )
+    parser.add_argument("--each", action="store_true", help="a verdict for each record, instead of one for all")
 
 
 def _run(arguments: argparse.Namespace) -> None:

@@ -37,7 +37,9 @@ def add_record_arguments(
     """Records and a model, how to read them, what to fit and what to judge, and where results go."""
     parser.add_argument("records", type=Path, nargs=nargs, metavar="RECORD", help="CSV, MATLAB, HDF5, UFF or Parquet")
     add_reading_arguments(parser)
-    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument(
+        "--model", type=Path, required=True, help="model file (YAML); values in it are held, but those with held: false"
+    )
     add_out_argument(parser, out)
 
 
@@ -45,8 +47,7 @@ def add_each_record_argument(parser: argparse.ArgumentParser) -> None:
     """Coefficients that are to differ between records that are fitted together."""
     parser.add_argument(
         "--each-record", action="append", default=[], metavar="TERM",
-        help="a term or coefficient that may differ between the records, to which one model is fitted: all others are "
-        "shared",
+        help="a term or coefficient that may differ between the records; one fit shares all others",
     )  # fmt: skip
 
 
@@ -75,21 +76,20 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder or structure of an HDF5 or MATLAB file; several are a record each",
     )  # fmt: skip
     reading.add_argument("--period", type=whole_number(2, 2**40), help="samples in a period of a periodic excitation")
+    reading.add_argument("--accept-saturated", action="store_true", help="accept a channel that stays at its limit")
     reading.add_argument(
-        "--accept-saturated", action="store_true", help="take a channel that rests at its extreme for what it is"
-    )
-    reading.add_argument(
-        "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
+        "--accept-swapped", action="store_true", help="accept force and response as named, though they seem exchanged"
     )
     reading.add_argument(
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
     reading.add_argument(
         "--as-sampled", action="store_true",
-        help="use all samples of a driven response, though its motion asks for fewer; they always are in free decays, "
-        "components, motions without a spring, and beside --use",
+        help="use all samples, though fewer would do (as is always done in decays, components, axes and with --use)",
     )  # fmt: skip
-    reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
+    reading.add_argument(
+        "--free", action="store_true", help="a free decay: no force acts, and a column of it is ignored"
+    )
     reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )

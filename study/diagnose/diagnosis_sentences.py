@@ -31,7 +31,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
         case _:
             said = _unknown(diagnosis)
     if diagnosis.comparison.prediction.diverged:
-        said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
+        said.insert(0, "The free run of the model grows without bound: its error counts as 100 %.")
     return said
 
 
@@ -41,8 +41,8 @@ def _nothing(diagnosis: Diagnosis) -> str:
     asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
-        f"{percent(comparison.prediction.error)}, and what is left depends no more than chance has it on the motion"
-        f"{where}, its past or time, as noise does; none of {asked} explains any of it."
+        f"{percent(comparison.prediction.error)}, and what is left looks like noise: it depends neither on the motion"
+        f"{where}, nor on its past, nor on time. None of {asked} explains any of it."
     )
 
 
@@ -79,9 +79,9 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
-        said.append(f"Structure of {percent(diagnosis.left)} of the response is left beside it.")
+        said.append(f"{percent(diagnosis.left)} of the response is left beside it that still depends on the motion.")
     if first.unphysical:
-        said.append(f"As fitted it is no physical effect: {first.unphysical}.")
+        said.append(f"As fitted it is not physical: {first.unphysical}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
@@ -101,11 +101,11 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
-        said.append(f"As fitted one of them is no physical effect: {answer.unphysical}.")
+        said.append(f"As fitted one of them is not physical: {answer.unphysical}.")
     if len(diagnosis.sets) > 1:
         count = len(diagnosis.sets)
         often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]
-        said.append(f"The record cannot tell {count} such sets apart; of these {count}, {enumerated(often)}.")
+        said.append(f"The record cannot tell {count} such sets apart. Of these, {enumerated(often)}.")
     return said
 
 
@@ -146,7 +146,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
             f"{percent(shares[0][1])} of what is unexplained, held out."
         )
     else:
-        said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
+        said.append("None of displacement, velocity, the past or time explains a tenth of it.")
     return said
 
 

@@ -228,7 +228,7 @@ def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int, *, a
     length = float(np.mean([len(s) for s in (*fit, *judge)])) * fit[0].source.dt
     of = f" of {stretches} stretches" if stretches > 1 else ""
     goes_on = "the free run of either part runs on through the other's"
-    begins = "the motion begins anew in each, from a state of its own"
+    begins = "the free run starts again in each, from a fitted state"
     return (
         f"every other block{of} is judged: {len(fit)} are fitted and {len(judge)} judged, of {length:.3g} s each on "
         f"average, and {begins if anew else goes_on}"
@@ -337,8 +337,8 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
 
 def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
     said = (
-        f"the free run of this model loses the motion on its way, so it begins anew every "
-        f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a state of its own"
+        "the free run of this model loses the motion on its way, so it is restarted every "
+        f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a fitted state"
     )
     record = replace(prepared.record, stretches=tuple(pieces))
     return replace(prepared, record=record, notes=(*prepared.notes, said), running_on=prepared)
