@@ -33,7 +33,7 @@ def test_a_good_record_is_left_without_a_word(tmp_path: Path) -> None:
 
 def test_units_that_nobody_gave_are_said(tmp_path: Path) -> None:
     (said,) = read_record(written(tmp_path / "rig.csv", shaken(), "force [N],displacement")).remarks
-    assert said == "displacement has no unit and is taken in m; --unit displacement=UNIT says otherwise"
+    assert said == "displacement has no unit and is taken in m (--unit displacement=UNIT says otherwise)"
 
 
 def test_a_force_of_the_wrong_sign_is_doubted_and_a_scale_turns_it_round(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ def on_units(record: Record, known: Collection[str]) -> tuple[str, ...]:
         return ()
     are, like = "have no unit and are" if len(bare) > 1 else "has no unit and is", bare[-1].replace(" ", ".")
     taken = list(dict.fromkeys(record.unit(c) for c in bare))
-    return (f"{enumerated(bare)} {are} taken in {enumerated(taken)}; --unit {like}=UNIT says otherwise",)
+    return (f"{enumerated(bare)} {are} taken in {enumerated(taken)} (--unit {like}=UNIT says otherwise)",)
 
 
 def on_samples(record: Record) -> tuple[str, ...]:
