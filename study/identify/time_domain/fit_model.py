@@ -163,8 +163,8 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     With what the model says of starts; near a mode that the user names by that alone.
     """
     linear = linear_start(model, prepared)
-    given = linear | model.starts
-    starts = [given] if prepared.near else [given, linear, linear | _reversed(model, prepared)]
+    given = [linear | model.starts] if model.starts or prepared.near else []
+    starts = given if prepared.near else [*given, linear, linear | _reversed(model, prepared)]
     omega = driven_at(model, prepared)
     if omega:  # only the transient tells the mass, and a fit begun at another resonance loses step with it
         steady = linear["k"] - linear["m"] * omega**2

@@ -34,7 +34,7 @@ def read_hdf5(path: Path, group: str | None) -> Table:
             if isinstance(item, h5py.Group):
                 for key, inner in item.items():
                     put(f"{name}/{key}", inner, deeper)
-            elif item.dtype == h5py.ref_dtype and deeper < 4:
+            elif h5py.check_ref_dtype(item.dtype) and deeper < 4:
                 for number, cell in enumerate(file[ref] for ref in item[()].ravel() if ref):
                     one = f"{name}/{number + 1}"
                     put(one if isinstance(cell, h5py.Group) else f"{one}/{name.rpartition('/')[2]}", cell, deeper + 1)
