@@ -109,6 +109,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--cutoff", type=finite_number(above=0.0), metavar="HZ",
         help="integrate measured accelerations above this frequency and judge nothing below (default: from the record)",
     )  # fmt: skip
+    judging.add_argument(
+        "--horizon", type=finite_number(above=0.0), metavar="S",
+        help="of a mass without a spring, whose motion drifts: fit and judge it over S seconds from a state of its own "
+        "(default: some periods of its motion)",
+    )  # fmt: skip
 
     judging.add_argument(
         "--near", type=finite_number(above=0.0), metavar="HZ",
@@ -211,6 +216,7 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
         arguments.near,
         arguments.up_to,
         arguments.as_sampled,
+        arguments.horizon,
     )
 
 

@@ -61,7 +61,7 @@ class FittedCandidate:
     @property
     def unknowns(self) -> int:
         """Coefficients and shape parameters: a clock, a memory or a shape of its own counts as what it is."""
-        return sum(len(e.term.components) + len(e.term.parameters) for e in self.entries)
+        return sum(map(unknowns_of, self.entries))
 
     @property
     def flexible(self) -> bool:
@@ -79,6 +79,11 @@ class FittedCandidate:
         values = self.fit.model.values
         broken = next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
         return broken or idle_effects(self.fit, self.entries, self.prediction.prepared)
+
+
+def unknowns_of(entry: ModelTerm) -> int:
+    """Coefficients and shape parameters of one effect; more than one of a flexible one."""
+    return len(entry.term.components) + len(entry.term.parameters)
 
 
 def _own(entry: ModelTerm, values: Mapping[str, float | None]) -> dict[str, float | None]:

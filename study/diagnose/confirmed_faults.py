@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
-from study.diagnose.verdict import Diagnosis
+from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import Fault
@@ -30,7 +30,9 @@ def diagnose_accounted(
 
     What a model lacks hides faults and imitates others. So where a set of effects is found, or something is left beside
     what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
-    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Arguments as for
+    record that is corrected for them is diagnosed, and the better of both diagnoses stands. Where nothing is found in
+    a corrected record, what was corrected may have been the motion that is missing: then the record is diagnosed
+    without what the model alone told of its faults. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
 
@@ -39,21 +41,30 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
-    answer = first.diagnosis.answer
-    if answer is None or (first.diagnosis.left <= TOLERANCE and not (accounted.faults and len(answer.entries) > 1)):
+    if first.diagnosis.verdict == UNKNOWN and any(f.corrected and not _plain(f) for f in accounted.faults):
+        uncorrected = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
+        first = uncorrected if uncorrected.diagnosis.answer is not None else first
+    answer, faults = first.diagnosis.answer, first.accounted.faults
+    beside = len(faults) > 0 or first.accounted is not accounted
+    if answer is None or (first.diagnosis.left <= TOLERANCE and not (beside and len(answer.entries) > 1)):
         return first
     model = accounted.comparison.model
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
-        faults = accounted.faults_beside(answer.fit, model)
-        if same(faults, accounted.faults):
+        shown = accounted.faults_beside(answer.fit, model)
+        if same(shown, faults):
             return first
-        again = found(accounted.corrected_for(faults))
+        again = found(accounted.corrected_for(shown))
     except StudyError:
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _plain(fault: Fault) -> bool:
+    """Whether a fault shows in the record itself, or is known, whatever model is held beside it."""
+    return fault.held or fault.lost is not None
 
 
 def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:

@@ -5,14 +5,14 @@ the best smaller set. The reverse system, where all terms are linear inputs, kno
 response biases it. In both a set is one small system of normal equations, and thousands cost no more than one free run.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from study.diagnose.candidates import FittedCandidate
+from study.diagnose.candidates import FittedCandidate, unknowns_of
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.starting_values import FAINT
@@ -23,6 +23,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
 
+OF_SIMPLE = 0.5  # of so many sets, as many more of simple effects alone
 BEAM = 200  # sets of a size from which those of the next are made
 COLLINEAR = 1e-10  # of the squared length of a column: what others leave of it is rounding
 
@@ -110,8 +111,7 @@ def by_sensitivities(
             model = model.with_term(entry)
         return SetStart(names, model, parent)
 
-    best = best_subsets(columns, beyond(target), sizes)
-    return {size: [started(names) for names in sets[:most]] for size, sets in best.items()}
+    return _chosen(columns, beyond(target), sizes, most, offered, started)
 
 
 def by_the_reverse_system(
@@ -145,8 +145,21 @@ def by_the_reverse_system(
         amounts = least_squares(np.stack([spectra[key] for key in keys], axis=1), target)
         return SetStart(names, model.with_values(dict(zip(keys, amounts.tolist(), strict=True))))
 
-    best = best_subsets(columns, target - basis @ (basis.T @ target), sizes)
-    return {size: [started(names) for names in sets[:most]] for size, sets in best.items()}
+    return _chosen(columns, target - basis @ (basis.T @ target), sizes, most, offered, started)
+
+
+def _chosen(
+    columns: Mapping[str, Floats], target: Floats, sizes: Sequence[int], most: int, offered: Mapping[str, ModelTerm],
+    started: Callable[[frozenset[str]], SetStart],
+) -> dict[int, list[SetStart]]:  # fmt: skip
+    """By size the sets that explain most, and of simple effects alone those that do: flexible ones imitate them all."""
+    best = best_subsets(columns, target, sizes)
+    simple = {name: column for name, column in columns.items() if unknowns_of(offered[name]) == 1}
+    plain = best_subsets(simple, target, sizes) if 0 < len(simple) < len(columns) else {}
+    return {
+        size: [started(n) for n in dict.fromkeys([*best[size][:most], *plain.get(size, [])[: int(OF_SIMPLE * most)]])]
+        for size in sizes
+    }
 
 
 def _entry(model: Model, name: str) -> ModelTerm:

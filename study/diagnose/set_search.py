@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from study.diagnose import set_screening
-from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate
+from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate, unknowns_of
 from study.diagnose.set_screening import SetStart
 from study.equations.model import ModelTerm
 from study.identify.time_domain.fit_model import TRIED, grown_states
@@ -35,9 +35,10 @@ class SetSearch:
     offered: dict[str, ModelTerm]  # the same with the shape parameters at which each was best alone
     tried: dict[frozenset[str], FittedCandidate] = field(default_factory=dict[frozenset[str], FittedCandidate])
 
-    def sets(self, size: int) -> list[FittedCandidate]:
-        """Sets of so many effects that were fitted, the best first; those that are no physical effects come last."""
-        return sorted((c for names, c in self.tried.items() if len(names) == size), key=by_power)
+    def sets(self, size: int, *, simple: bool = False) -> list[FittedCandidate]:
+        """Sets of so many effects, or simple ones, that were fitted; the best first, what is not physical last."""
+        fitted = (c for names, c in self.tried.items() if len(names) == size and not (simple and c.flexible))
+        return sorted(fitted, key=by_power)
 
     def fit(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
@@ -86,31 +87,33 @@ def searched(
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
     ``singles`` are the effects as fitted alone. ``done`` says whether a set leaves nothing to be explained;
-    ``fewer_than`` are the unknowns of an effect that leaves nothing alone: then sets of simple effects with fewer are
-    asked for.
+    ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple effects with fewer
+    are asked for.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
     search = SetSearch(base, {c.name: c.entry for c in singles}, offered, {frozenset(c.names): c for c in singles})
     sizes = range(2, MOST + 1)
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
-    best = search.sets(1)[0] if singles else None
+    best = next(iter(search.sets(1, simple=fewer_than is not None)), None)
     for size in sizes:
+        simple = fewer_than is not None
         if best is None or (fewer_than is not None and size >= fewer_than):
             break
-        starts = list(reverse.get(size, ()))
-        for parent in _parents(search.sets(size - 1), simple=fewer_than is not None):
-            starts += set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
+        asked = {name: entry for name, entry in offered.items() if not simple or unknowns_of(entry) == 1}
+        starts = [start for start in reverse.get(size, ()) if start.names <= set(asked)]
+        for parent in _parents(search.sets(size - 1), simple=simple):
+            starts += set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
         if size == 2:
-            starts += set_screening.by_sensitivities(None, offered, base, [size], EACH)[size]
+            starts += set_screening.by_sensitivities(None, asked, base, [size], EACH)[size]
         report = None if progress is None else partial(_counted, progress, len(search.tried))
         search.fit(starts, report)
-        for parent in _parents(search.sets(size), simple=fewer_than is not None):  # one may change places with another
-            exchanged = set_screening.by_sensitivities(parent, offered, base, [size], EACH)[size]
+        for parent in _parents(search.sets(size), simple=simple):  # one may change places with another
+            exchanged = set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
             search.fit([start for start in exchanged if start.names not in search.tried], report)
-        larger = search.sets(size)
-        if not larger or not gains(best, larger[0], len(starts)):
+        larger = next(iter(search.sets(size, simple=simple)), None)
+        if larger is None or not gains(best, larger, len(starts)):
             break
-        best = larger[0]
+        best = larger
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
     for names in [frozenset(c.names) for size in sizes for c in search.sets(size)[:2]]:

@@ -11,7 +11,7 @@ from study.compare import dependence
 from study.compare.comparison import Comparison
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
-from study.diagnose import candidates
+from study.diagnose import candidates, set_search
 from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -153,9 +153,10 @@ def _decide(
         return one
     # shapes of the motion see little of what is left in a drifting one: then a second effect is asked for all the same
     if first is not None and one.verdict == MISSING and _nearly_all(first):
-        if first.unknowns <= 2:
+        if first.unknowns <= 2 and not (first.flexible and one.left > TOLERANCE):
             return one
-        fewer_than = first.unknowns
+        # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
+        fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
     search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
@@ -166,6 +167,10 @@ def _decide(
     verdict = _verdict_on(good, left, comparison.prepared, asked)
     if verdict == UNKNOWN and first is not None and _stands_out(first, comparison.prepared):
         return replace(one, verdict=MISSING, rows=[first] + [r for r in rows if r is not first])
+    core = _necessary(good, search, comparison, asked) if verdict == UNKNOWN else None
+    if core is not None and believed(core, prediction, own) and not core.wanders(asked):
+        verdict, answer, left = PARTLY_KNOWN, core, _left(core.fit, core.prediction)
+        good = [core, *(r for r in good if r.name != core.name)]
     if verdict != UNKNOWN:
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
     return _Decision(verdict, rows, left, good)
@@ -180,7 +185,7 @@ def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, as
         return _Decision(UNKNOWN if left > TOLERANCE or lost else NOTHING, rows, left, [])
     left = _left(first.fit, first.prediction)
     alone = [first, *(r for r in rows if r.name in first.tied_with)]
-    if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked):
+    if (first.gain.explained >= ENOUGH or left <= GOOD) and not (first.unphysical or first.wanders(asked)):
         return _Decision(MISSING, [first] + [r for r in rows if r is not first], left, alone)
     return _Decision(UNKNOWN, rows, left, alone)
 
@@ -236,6 +241,25 @@ def _material(
         answer = fewer if fewer is not None else rank([least], comparison, len(search.tried))[0]
         left = _left(answer.fit, answer.prediction)
     return answer, left
+
+
+def _necessary(sets: Sequence[Ranked], search: SetSearch, comparison: Comparison, asked: int) -> Ranked | None:
+    """What all sets have that the record cannot tell apart, as a set of its own; None where they have nothing alike.
+
+    Beside a force that the library lacks they imitate it in ways of their own, and have what is truly there in common.
+    """
+    names = frozenset(sets[0].names)
+    common = names.intersection(*(row.names for row in sets))
+    for name in sorted(names - common) if common else ():
+        search.without(names, name)
+        names = names - {name}
+        if names not in search.tried:
+            return None
+    core = search.tried.get(common)
+    if core is None:
+        return None
+    row = rank(with_best_settled([core], comparison.prepared), comparison, asked + len(search.tried))[0]
+    return row if row.gain.explained >= MOST and not row.unphysical else None
 
 
 def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:

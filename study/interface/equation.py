@@ -281,7 +281,7 @@ class Model:
         response: str | None = None, cutoff: float | None = None, near: float | None = None,
         up_to: float | None = None, estimator: str = "output_error",
         measurement: "Given | bool | None" = None, as_sampled: bool = False,
-        absolute: bool = False, each_record: Sequence[str] = (),
+        absolute: bool = False, each_record: Sequence[str] = (), horizon: float | None = None,
     ) -> "Fit":  # fmt: skip
         """Fit what the model leaves open to one part of a record, and judge it on the other.
 
@@ -322,6 +322,9 @@ class Model:
             On a moving base, the response was measured absolutely: the base's motion is subtracted.
         each_record : sequence of str
             Terms or coefficients that may differ between the records: all others are shared (:meth:`Fit.by_record`).
+        horizon : float, optional
+            Seconds over which the motion of a mass without a spring, which drifts, is fitted and judged, each time from
+            a state of its own; by default some periods of its motion.
 
         Raises
         ------
@@ -334,6 +337,7 @@ class Model:
             self, record, fit=fit, judge=judge, use=use, response=response, cutoff=cutoff, near=near, up_to=up_to,
             estimator=estimator,
             measurement=measurement, as_sampled=as_sampled, absolute=absolute, each_record=each_record,
+            horizon=horizon,
         )  # fmt: skip
 
     def __repr__(self) -> str:

@@ -345,7 +345,7 @@ def fitted(
     judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
     cutoff: float | None, near: float | None, up_to: float | None, estimator: str,
     measurement: Given | bool | None, as_sampled: bool,
-    absolute: bool, each_record: Sequence[str],
+    absolute: bool, each_record: Sequence[str], horizon: float | None,
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
     records, separate = records_of(record), tuple[Separate, ...]()
@@ -353,11 +353,12 @@ def fitted(
     expect(cutoff is None or 0.0 < cutoff < math.inf, f"cutoff is {cutoff!r}; expected a frequency above 0 Hz")
     for name, given in (("near", near), ("up_to", up_to)):
         expect(given is None or 0.0 < given < math.inf, f"{name} is {given!r}; expected a frequency above 0 Hz")
+    expect(horizon is None or 0.0 < horizon < math.inf, f"horizon is {horizon!r}; expected a time above 0 s")
     alternate = judge == "every-other-block"
     layout = Layout(
         tuple(_stretch(pair) for pair in use), _samples("fit", fit, records[0]),
         None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, near, up_to,
-        as_sampled,
+        as_sampled, horizon,
     )  # fmt: skip
     equation, asked = model.equation, list[measured.Record](distinct(records))
     if each_record:

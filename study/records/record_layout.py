@@ -41,6 +41,7 @@ class Layout:
     near: float | None = None  # hertz near which the mode lies that is meant, where the record shows several
     highest: float | None = None  # hertz above which nothing is used
     as_sampled: bool = False  # whether all samples are used, though the motion asks for fewer
+    horizon: float | None = None  # seconds over which the motion of a mass that nothing brings back is judged
 
     @property
     def explicit(self) -> bool:
@@ -120,7 +121,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
             fit, judge = alternating(stretches, sensors, anew)
         notes += [_said(fit, judge, len(stretches), anew=bool(anew))] if turns else []
     if kind.drifts:
-        (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
+        (fit, first), (judge, second) = (within_the_horizon(part, sensors, layout.horizon) for part in (fit, judge))
         notes.append(
             f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon "
             f"of {0.5 * (first + second):.3g} s, from {len(fit)} and {len(judge)} states of its own"
@@ -143,6 +144,10 @@ def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: Kind
         not (layout.explicit and len(records) > 1),
         f"{', '.join(record.name for record in records)}: --fit and --judge A:B name samples of one record; expected "
         "'--judge every-other-block' of several, or --use",
+    )
+    expect(
+        layout.horizon is None or kind.drifts,
+        "--horizon is for a mass that nothing in the model brings back; expected no horizon of a motion about a rest",
     )
     asked = len(records) > 1 or layout.alternate or layout.use
     expect(
@@ -247,12 +252,17 @@ def cut(stretch: Stretch, count: int) -> list[Stretch]:
     return [replace(stretch, first=a, last=b) for a, b in itertools.pairwise(bounds)]
 
 
-def within_the_horizon(stretches: Sequence[Stretch], sensors: Sequence[Sensor]) -> tuple[list[Stretch], float]:
-    """Stretches in pieces of some periods of the motion, and their mean length in seconds."""
+def within_the_horizon(
+    stretches: Sequence[Stretch], sensors: Sequence[Sensor], seconds: float | None = None
+) -> tuple[list[Stretch], float]:
+    """Stretches in pieces of so many seconds, or some periods of the motion, and their mean length in seconds."""
     pieces = list[Stretch]()
     for stretch in stretches:
-        wanted = len(stretch) / (HORIZON * period_of(stretch, sensors))
-        count = min(max(round(wanted), -(-PIECES // len(stretches))), max(len(stretch) // FEWEST, 1))
+        if seconds is None:
+            wanted = max(len(stretch) / (HORIZON * period_of(stretch, sensors)), -(-PIECES // len(stretches)))
+        else:
+            wanted = len(stretch) * stretch.source.dt / seconds
+        count = min(max(round(wanted), 1), max(len(stretch) // FEWEST, 1))
         pieces += cut(stretch, count)
     return pieces, float(np.mean([len(p) for p in pieces])) * stretches[0].source.dt
 

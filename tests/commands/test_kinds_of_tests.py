@@ -200,6 +200,12 @@ def test_every_other_block_of_a_sweep_is_judged(systems):
     assert any("every other block is judged" in note for note in found["notes"])
 
 
+def test_a_horizon_is_for_a_mass_without_a_spring(systems, capsys):
+    decay(lightly(systems["linear"]))
+    said = refused(capsys, "compare", "decay.csv", "--model", "rig.yaml", "--horizon", "1")
+    assert "--horizon is for a mass that nothing in the model brings back" in said
+
+
 @pytest.mark.long
 def test_an_axis_is_judged_over_a_horizon_and_never_called_chaotic():
     drawn("axis", 3, ("coulomb_friction",))
@@ -208,4 +214,6 @@ def test_an_axis_is_judged_over_a_horizon_and_never_called_chaotic():
     assert found["candidates"][0]["term"] == "coulomb_friction"
     notes = compared("record.csv", "--model", "axis.yaml")["notes"]
     assert any("over a horizon of" in note for note in notes)
+    shorter = compared("record.csv", "--model", "axis.yaml", "--horizon", "0.5")["notes"]
+    assert any("over a horizon of 0.5" in note for note in shorter)
     assert not any("chaotic" in note for note in notes)

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from study.diagnose import confirmed_faults
 from study.diagnose.confirmed_faults import diagnose_accounted, same
+from study.diagnose.verdict import SEVERAL, UNKNOWN
 from study.faults.fault import Fault
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
@@ -59,6 +61,7 @@ class Corrected:
         self.faults, self.beside = tuple(faults), beside
         self.comparison = SimpleNamespace(model=Model("inertia"))
         self.asked: list[tuple[str, ...]] = []
+        self.otherwise: list[tuple[Fault, ...]] = []  # for what it was corrected in its place
 
     def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
         self.asked.append(model.names)
@@ -67,6 +70,7 @@ class Corrected:
         return tuple(self.beside)
 
     def corrected_for(self, faults: Sequence[Fault]) -> "Corrected":
+        self.otherwise.append(tuple(faults))
         return Corrected(faults, ())
 
 
@@ -80,7 +84,7 @@ def diagnosed(
         names, left, error = found[len(made)]
         made.append(names)
         answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
-        return SimpleNamespace(answer=answer, left=left)
+        return SimpleNamespace(answer=answer, left=left, verdict=SEVERAL if names else UNKNOWN)
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
@@ -112,7 +116,7 @@ def test_the_better_of_both_diagnoses_stands(monkeypatch: pytest.MonkeyPatch, ag
 @pytest.mark.parametrize(
     ("names", "left", "faults"),
     [
-        ((), 0.1, [OFFSET]),  # nothing beside which to ask
+        ((), 0.1, []),  # nothing beside which to ask
         (ONE, TOLERANCE, [OFFSET]),  # one effect leaves nothing
         (SET, TOLERANCE, []),  # a set leaves nothing, and nothing was corrected that it may have imitated
     ],
@@ -125,6 +129,33 @@ def test_faults_are_not_asked_for_again_where_there_is_no_reason_to(
     assert made == 1
     assert not record.asked
     assert found.accounted is record
+
+
+SPIKES = Fault("spikes", "displacement", 3.0, lost=np.zeros(9, dtype=bool))
+KNOWN = delay(0.5, held=True)
+
+
+def test_what_was_corrected_may_be_the_motion_that_is_missing(monkeypatch: pytest.MonkeyPatch):
+    """Where nothing is found, the record is diagnosed without what the model alone told of its faults."""
+    record = Corrected([OFFSET, SPIKES, KNOWN], beside=[SPIKES, KNOWN])
+    found, made = diagnosed(monkeypatch, record, ((), 0.1, 0.0), (SET, 0.0, 0.05))
+    assert made == 2
+    assert record.otherwise[0] == (SPIKES, KNOWN)
+    assert found.diagnosis.answer.response_error == 0.05
+    assert found.accounted.faults == (SPIKES, KNOWN)
+
+
+def test_where_nothing_is_found_either_way_the_corrected_record_stands(monkeypatch: pytest.MonkeyPatch):
+    record = Corrected([OFFSET], beside=[])
+    found, made = diagnosed(monkeypatch, record, ((), 0.1, 0.0), ((), 0.1, 0.0))
+    assert made == 2
+    assert found.accounted is record
+
+
+@pytest.mark.parametrize("faults", [[SPIKES], [KNOWN], [NOISE]])
+def test_what_shows_without_a_model_stays_corrected(monkeypatch: pytest.MonkeyPatch, faults: list[Fault]):
+    record = Corrected(faults, beside=[])
+    assert diagnosed(monkeypatch, record, ((), 0.1, 0.0))[1] == 1
 
 
 @pytest.mark.parametrize(("names", "left"), [(ONE, 2.0 * TOLERANCE), (SET, 0.0)])

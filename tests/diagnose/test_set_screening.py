@@ -1,6 +1,8 @@
 """Which sets of effects are worth a fit: what the search over columns finds is what trying every set finds."""
 
 from itertools import combinations
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +34,22 @@ def test_the_sets_are_those_of_exhaustive_enumeration_in_their_order(seed: int):
     for size in SIZES:
         every = sorted(combinations(columns, size), key=lambda names: -explained(columns, names, target))
         assert found[size] == [frozenset(names) for names in every]
+
+
+def test_sets_of_simple_effects_are_worth_a_fit_beside_flexible_ones_that_imitate_them():
+    rng = np.random.default_rng(8)
+    shapes = rng.normal(size=(80, 4))
+    target = shapes @ np.ones(4)
+    columns = {name: shapes[:, [i]] for i, name in enumerate("abcd")}
+    columns |= {name: shapes + 0.01 * rng.normal(size=(80, 4)) for name in "efg"}
+    offered: Any = {
+        name: SimpleNamespace(term=SimpleNamespace(components=(name,), parameters=(name,) * (column.shape[1] - 1)))
+        for name, column in columns.items()
+    }
+    started: Any = set_screening._chosen(columns, target, (2,), 4, offered, lambda names: names)[2]
+    assert all(names & set("efg") for names in started[:4])
+    assert len(started) == 6
+    assert all(names <= set("abcd") for names in started[4:])
 
 
 def test_effects_that_explain_only_together_are_found():

@@ -26,12 +26,18 @@ def left_by(amounts: Mapping[str, float]) -> Floats:
     return NOISE + sum((a * SHAPES[name] for name, a in amounts.items()), np.zeros(2 * N))
 
 
+def effect(name: str) -> Any:
+    """An effect with a coefficient, and so many shape parameters as are its unknowns more than that."""
+    shape = SimpleNamespace(components=(name,), parameters=(name,) * (UNKNOWNS.get(name, 1) - 1))
+    return SimpleNamespace(name=name, term=shape)
+
+
 def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: str = "") -> Any:
     """A set as fitted, of which these amounts are left."""
     chosen, left = tuple(sorted(names)), left_by(amounts)
     unknowns = sum(UNKNOWNS.get(name, 1) for name in chosen)
     model = SimpleNamespace(
-        terms=[SimpleNamespace(name=name) for name in chosen],
+        terms=[effect(name) for name in chosen],
         without_term=lambda name: SimpleNamespace(without=name),
     )
     record = SimpleNamespace(stretches=())
@@ -64,11 +70,14 @@ class Bench:
     def every(_: frozenset[str], size: int) -> Sequence[Iterable[str]]:
         return list(combinations(NAMES, size))
 
-    def by_sensitivities(self, parent: Any, _offered: Any, _base: Any, sizes: Sequence[int], _most: int) -> Any:
+    def by_sensitivities(self, parent: Any, offered: Any, _base: Any, sizes: Sequence[int], _most: int) -> Any:
         names = frozenset[str]() if parent is None else frozenset(parent.names)
         self.asked += [(None if parent is None else parent.name, size) for size in sizes]
         model: Any = None
-        return {n: [SetStart(frozenset(s), model, parent) for s in self.proposed(names, n)] for n in sizes}
+        return {
+            n: [SetStart(frozenset(s), model, parent) for s in self.proposed(names, n) if set(s) <= set(offered)]
+            for n in sizes
+        }
 
     def search(self, *, done: bool = False, fewer_than: int | None = None) -> SetSearch:
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES]
@@ -141,11 +150,24 @@ def test_where_one_effect_leaves_nothing_only_simple_sets_with_fewer_unknowns_ar
     beside = {parent for parent, _ in bench.asked if parent is not None}
     assert beside
     assert not any("f" in parent for parent in beside)
+    assert not any("f" in names for names, _ in bench.fitted)  # nor is a set with it worth a fit
     assert frozenset("ab") in search.tried
 
     none = Bench(monkeypatch, leaves)
     none.search(fewer_than=2)
     assert not none.fitted
+
+
+def test_simple_sets_grow_by_what_they_gain_themselves_though_a_flexible_effect_does_better_than_two(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        return {"c": 0.3} if "f" in found else dict.fromkeys({"a", "b", "c"} - found, 1.0)
+
+    search = Bench(monkeypatch, leaves).search(fewer_than=set_search.MOST + 1)
+    assert best(search, 1) == "f"
+    assert search.sets(2, simple=True)[0].power > search.sets(1)[0].power > search.sets(3)[0].power
+    assert best(search, 3) == "abc"
 
 
 def test_a_flexible_set_that_leaves_nothing_ends_the_search_at_its_own_unknowns(monkeypatch: pytest.MonkeyPatch):

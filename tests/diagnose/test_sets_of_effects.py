@@ -72,6 +72,30 @@ def test_an_effect_explains_more_than_what_is_left_or_goes(monkeypatch: pytest.M
     assert beside == left
 
 
+@pytest.mark.parametrize(
+    ("sets", "explained", "unphysical", "core"),
+    [
+        (("abc", "abd", "abf"), 0.9, "", "ab"),
+        (("abc", "ad"), 0.9, "", "a"),
+        (("abc", "d"), 0.9, "", None),  # they have nothing alike
+        (("abc", "abd"), 0.4, "", None),  # what they have alike explains little
+        (("abc", "abd"), 0.9, "a mass is positive", None),
+    ],
+)
+def test_what_all_good_sets_have_is_a_set_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, sets: tuple[str, ...], explained: float, unphysical: str, core: str | None
+):
+    tried = {frozenset(names): a_set(names, 0.1) for names in ("ab", "ac", "bc", "a", "b", "c", *sets)}
+    search: Any = SimpleNamespace(tried=tried, without=lambda names, name: tried.get(names - {name}))
+    monkeypatch.setattr(verdict, "with_best_settled", lambda rows, _: rows)
+    monkeypatch.setattr(verdict, "rank", lambda rows, *_: [
+        SimpleNamespace(**vars(row), gain=SimpleNamespace(explained=explained), unphysical=unphysical) for row in rows
+    ])  # fmt: skip
+    comparison: Any = SimpleNamespace(prepared=None)
+    found = verdict._necessary([a_set(names, 0.1) for names in sets], search, comparison, 9)
+    assert ("".join(found.names) if found else None) == core
+
+
 @pytest.fixture(scope="module")
 def rig() -> Trial:
     return make_trial(105, HIDDEN, 0.02**2, "displacement", test="like_the_report")
