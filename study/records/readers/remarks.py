@@ -12,7 +12,6 @@ from study.support.numbers import enumerated
 LEAVING_OUT = "--use "  # the option that follows such a remark
 SLICES = 100  # of a record; what lies far outside all others in the first is no motion ...
 OUTSIDE = 5.0  # ... where it is so many times as far from the middle as anything later
-STILL = 0.02  # of the liveliest slice's scatter: a slice with less is at rest
 
 
 def on_units(record: Record, known: Collection[str]) -> tuple[str, ...]:
@@ -57,11 +56,11 @@ def _junk(values: Floats) -> int:
     return last if jumps else 0
 
 
-def _rest(channels: list[Floats]) -> int:
-    """Samples for which all channels are at rest from the beginning on."""
+def _rest(channels: list[Floats], still: float = 0.02) -> int:
+    """Samples for which all channels are at rest from the beginning on: less than ``still`` of the liveliest slice scatters."""
     size = max(len(channels[0]) // SLICES, 2)
     count = len(channels[0]) // size
     blocks = np.stack([x[: count * size].reshape(count, size) for x in channels])
     scatter = np.std(blocks, axis=2)
-    lively = np.any(scatter > STILL * np.max(scatter, axis=1, keepdims=True), axis=0)
+    lively = np.any(scatter > still * np.max(scatter, axis=1, keepdims=True), axis=0)
     return int(np.argmax(lively)) * size
