@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture notebooks docs gallery readme estimators trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture next_test notebooks docs gallery readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -46,6 +46,9 @@ fault_pictures: $(READY)
 report_picture: $(READY)
 	$(BIN)/python scripts/report_picture.py models docs/report.png
 
+next_test: $(READY)
+	$(BIN)/python scripts/next_test_docs.py docs
+
 notebooks: $(READY)
 	$(BIN)/python scripts/notebooks.py docs/notebooks/*.ipynb
 
@@ -65,7 +68,7 @@ estimators: $(READY)
 	$(BIN)/snakemake -j2 estimators
 	$(BIN)/python scripts/estimator_docs.py
 
-# TABLE: trials, trials_by_test, trials_of_structures or trials_like_rigs.
+# TABLE: trials, trials_by_test, trials_of_structures, trials_like_rigs or trials_of_next_tests.
 TABLE = trials
 trials: $(READY)
 	$(BIN)/snakemake -j2 $(TABLE)

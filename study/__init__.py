@@ -20,6 +20,7 @@ _HOMES = {  # loaded when it is first used: neither ``import study`` nor a comma
     "forces": ("Force", "gaussian", "multisine", "simulate", "sweep", "waves"),
     "found": ("Candidate", "Diagnosis"),
     "side_by_side": ("Across", "Ranking", "compare"),
+    "planned": ("PlannedTest",),
     "paths": ("Identification", "identify"),
 }
 _PLACES = {name: f"study.interface.{home}" for home, names in _HOMES.items() for name in names}
@@ -27,9 +28,9 @@ _PLACES["StudyError"] = "study.support.errors"
 _PACKAGES = ("compare", "identify")  # whose names are functions of the interface too
 
 __all__ = [
-    "Across", "Candidate", "Diagnosis", "Fit", "Force", "Identification", "Model", "Ranking", "Record", "StudyError",
-    "Term", "__version__", "compare", "gaussian", "identify", "library", "multisine", "read", "record", "simulate",
-    "sweep", "term", "waves",
+    "Across", "Candidate", "Diagnosis", "Fit", "Force", "Identification", "Model", "PlannedTest", "Ranking",
+    "Record", "StudyError", "Term", "__version__", "compare", "gaussian", "identify", "library", "multisine",
+    "read", "record", "simulate", "sweep", "term", "waves",
 ]  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from study.interface.found import Candidate as Candidate
 from study.interface.found import Diagnosis as Diagnosis
 from study.interface.paths import Identification as Identification
 from study.interface.paths import identify as identify
+from study.interface.planned import PlannedTest as PlannedTest
 from study.interface.side_by_side import Across as Across
 from study.interface.side_by_side import Ranking as Ranking
 from study.interface.side_by_side import compare as compare

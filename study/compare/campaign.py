@@ -9,8 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from study.compare import across_levels
-from study.compare.fitted_coefficients import Coefficient
+from study.compare.fitted_coefficients import Coefficient, Level, across_levels
 from study.equations.place import Kind, Place, place_in_words
 from study.figures.labels import prefixed, term_names
 from study.support import document
@@ -129,7 +128,7 @@ def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
     columns = [", ".join(filter(None, (record.name, record.shown_level))) for record in rows]
     if len(rows) == 1:
         return [document.table(("coefficient", *columns, "unit"), [(c.key, _value(c), c.unit) for c in own[0]])]
-    judged = {level.key: level for level in across_levels.across_levels([record.level for record in rows], own)}
+    judged = {level.key: level for level in across_levels([record.level for record in rows], own)}
     lines = [
         (key[0].key, *map(_value, key), key[0].unit, *_judged(judged.get(key[0].key))) for key in zip(*own, strict=True)
     ]
@@ -140,7 +139,7 @@ def _value(found: Coefficient) -> str:
     return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} ± {1.96 * found.error:.2g}"
 
 
-def _judged(level: across_levels.Level | None) -> tuple[str, str]:
+def _judged(level: Level | None) -> tuple[str, str]:
     if level is None:
         return "", ""
     return "no" if level.moves else "yes", f"{level.p_value:.2g}" if level.p_value > TINY else f"< {TINY:g}"

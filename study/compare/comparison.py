@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from study.compare.across_levels import Level, across_levels
 from study.compare.along_time import AlongTime, along_time
 from study.compare.bands import Band, bands
 from study.compare.by_estimator import FREE_RUN, fit_by
 from study.compare.dependence import FamilyGain, families, left_by
-from study.compare.fitted_coefficients import Coefficient, coefficients, found_by
+from study.compare.fitted_coefficients import Coefficient, Level, across_levels, coefficients, found_by, rivals_note
 from study.compare.force_error import ForceError, force_error
 from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
-from study.compare.minima import rivals_note
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
 from study.compare.prediction import Prediction, SensorPrediction, predict
 from study.equations.equations_of_motion import loose_motions

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from study.compare import panels
-from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
+from study.compare.fitted_coefficients import Level
 from study.compare.force_map import curve, surface
 from study.compare.loops import loops
 from study.compare.place_pictures import place_figures, responses_figure

@@ -10,13 +10,12 @@ import numpy as np
 import pandas as pd
 from tabulate import tabulate
 
-from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.decay import decays_of
 from study.compare.dependence import explained_by_place
-from study.compare.fitted_coefficients import Coefficient
+from study.compare.fitted_coefficients import Coefficient, Level
 from study.compare.force_map import curve, surface
 from study.equations import model_file
 from study.equations.linear_part import Modes, modes_table

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from study.compare.across_levels import Level
 from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
+from study.compare.fitted_coefficients import Level
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.equations.place import place_in_words

@@ -35,7 +35,7 @@ DEGREE = 7
 KNOTS = 24  # of a function of displacement or velocity in detail ...
 EDGES = (0.01, 0.99)  # ... between these quantiles: what lies beyond is too rare to tell a detail
 TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
-LONGEST = 16384  # samples of either part that are looked at
+DEPENDENCE_SAMPLES = 16384  # samples of either part that are looked at
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Unexplained:
 
 def left_by(fit: FreeRunFit, prepared: Prepared) -> Unexplained:
     """What a fitted model leaves of no more of a record than this looks at."""
-    look = prepared.shortened(min(fit.samples, LONGEST))
+    look = prepared.shortened(min(fit.samples, DEPENDENCE_SAMPLES))
     return unexplained(baseline(continued(fit, look), look))
 
 
@@ -87,7 +87,7 @@ def unexplained(base: Baseline) -> Unexplained:
     """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone."""
     fit, prepared = base.fit, base.prepared
     first, last = prepared.plan.judge
-    prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
+    prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + DEPENDENCE_SAMPLES))))
     motions = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in fit.model.coordinates)
     free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
     exact = {} if base.several else _formulas(*np.std(free, axis=0).tolist())

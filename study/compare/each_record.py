@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import chdtrc
 from tabulate import tabulate
 
-from study.compare.across_levels import MOVES, RESOLUTION, Level
 from study.compare.comparison import Comparison
+from study.compare.fitted_coefficients import MOVES, RESOLUTION, Level
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import Component, Term
 from study.records.record import Record
@@ -58,6 +58,11 @@ def separated(
     expect(
         len(records) > 1,
         f"--each-record {names[0]}: there is one record; expected two or more, between which coefficients may differ",
+    )
+    expect(
+        not model.modal,
+        f"--each-record {names[0]}: the linear part of the model is a sum of modes, which are those of one record; "
+        "expected each record by itself, as 'study compare' and 'study diagnose --each' take several",
     )
     found = list(dict.fromkeys(item for name in names for item in _meant(model, name)))
     separate: list[Separate] = []

@@ -15,10 +15,10 @@ from study.compare.force_map import CLASSES, cells_of, edges
 from study.compare.missing_force import MissingForce
 from study.compare.prediction import Prediction, SensorPrediction
 from study.records.spectra import Segments
+from study.support.statistics import IN_A_BLOCK
 
 Floats = NDArray[np.float64]
 BLOCKS = 64  # at most
-SHORTEST = 16  # samples in a block
 WINDOW = 256  # samples in the spectrum of a block, at most
 
 
@@ -72,7 +72,7 @@ def visits_in_blocks(lacking: MissingForce) -> Visits:
 
 def _bounds(samples: int) -> NDArray[np.int64]:
     """First sample of each block, and the one after the last."""
-    return np.linspace(0, samples, int(np.clip(samples // SHORTEST, 1, BLOCKS)) + 1).round().astype(np.int64)
+    return np.linspace(0, samples, int(np.clip(samples // IN_A_BLOCK, 1, BLOCKS)) + 1).round().astype(np.int64)
 
 
 def _place(values: Floats, bounds: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from study.records import noise_floor
 from study.records.prepared import Prepared
 from study.records.record import Sensor
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 
 Floats = NDArray[np.float64]
 AVERAGES = 8  # segments without overlap, at least
-LONGEST = 1024  # samples in a segment
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
@@ -44,7 +43,7 @@ class Noise:
 
 def segments_of(samples: int) -> Segments:
     """Segments for the spectra of a comparison."""
-    return Segments(length=max(32, min(LONGEST, 2 ** int(np.log2(max(samples // AVERAGES, 32))))))
+    return Segments(segment_length(samples, held=AVERAGES, fewest=32, most=1024))
 
 
 def noise_of(

@@ -12,8 +12,8 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from study.compare.across_levels import Level
 from study.compare.along_time import AlongTime
+from study.compare.fitted_coefficients import Level
 from study.compare.force_error import ForceError
 from study.compare.force_map import ForceCurve, Surface
 from study.equations import dimensions

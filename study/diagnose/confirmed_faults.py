@@ -1,7 +1,7 @@
 """Faults of the measurement in the light of a diagnosis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
@@ -45,16 +45,21 @@ def diagnose_accounted(
         uncorrected = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
         first = uncorrected if uncorrected.diagnosis.answer is not None else first
     answer, faults = first.diagnosis.answer, first.accounted.faults
-    beside = len(faults) > 0 or first.accounted is not accounted
-    if answer is None or (first.diagnosis.left <= TOLERANCE and not (beside and len(answer.entries) > 1)):
+    if answer is None:
         return first
     model = accounted.comparison.model
+    beside = len(faults) > 0 or first.accounted is not accounted
+    noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
+    if first.diagnosis.left <= TOLERANCE and not (noisy or (beside and len(answer.entries) > 1)):
+        return first
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
         shown = accounted.faults_beside(answer.fit, model)
         if same(shown, faults):
-            return first
+            known = {(fault.fault, fault.channel) for fault in first.faults}
+            said = tuple(f for f in shown if not f.corrected and (f.fault, f.channel) not in known)
+            return replace(first, faults=(*first.faults, *said))
         again = found(accounted.corrected_for(shown))
     except StudyError:
         return first

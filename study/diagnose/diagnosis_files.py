@@ -9,7 +9,8 @@ from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
-from study.diagnose.separating_test import advice
+from study.diagnose.next_test import suggested
+from study.diagnose.next_test_report import advice_in_words, next_test_fields
 from study.diagnose.verdict import NOTHING, Diagnosis
 from study.equations.linear_part import modes_table
 from study.faults import fault
@@ -22,7 +23,7 @@ def diagnosis_in_words(diagnosis: Diagnosis) -> str:
     """A diagnosis in sentences, with the test that would tell tied candidates apart."""
     said = diagnosis_sentences(diagnosis)
     if diagnosis.answer is not None:
-        said.append(advice(diagnosis.sets, diagnosis.comparison.prepared))
+        said.append(advice_in_words(suggested(diagnosis)))
     said += [f"{note[0].upper()}{note[1:]}." for note in choices_in_words(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
@@ -65,6 +66,8 @@ def diagnosis_files(
         after = diagnosis.modes_after
         content["modes"] = {"before": mode_rows(comparison.modes), "after": after and mode_rows(after)}
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
+    following = suggested(diagnosis)
+    content["next_test"] = following and next_test_fields(following)
     content["not_needed"] = needless_fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
     content |= {"notes": list(comparison.notes), "every_sample": comparison.prepared.every}

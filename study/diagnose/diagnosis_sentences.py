@@ -79,7 +79,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
-        said.append(f"{percent(diagnosis.left)} of the response is left beside it that still depends on the motion.")
+        said.append(f"{percent(diagnosis.left)} of the response is left beside it that is no noise.")
     if first.unphysical:
         said.append(f"As fitted it is not physical: {first.unphysical}.")
     if first.tied_with:

@@ -81,18 +81,20 @@ def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
 
 
 def searched(
-    base: Baseline, singles: Sequence[FittedCandidate], done: Callable[[FittedCandidate], bool],
-    fewer_than: int | None = None, progress: Progress | None = None,
+    base: Baseline, singles: Sequence[FittedCandidate], settled: Sequence[FittedCandidate],
+    done: Callable[[FittedCandidate], bool], fewer_than: int | None = None, progress: Progress | None = None,
 ) -> SetSearch:  # fmt: skip
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
-    ``singles`` are the effects as fitted alone. ``done`` says whether a set leaves nothing to be explained;
+    ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley.
+    ``done`` says whether a set leaves nothing to be explained;
     ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple effects with fewer
     are asked for.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
     search = SetSearch(base, {c.name: c.entry for c in singles}, offered, {frozenset(c.names): c for c in singles})
     sizes = range(2, MOST + 1)
+    search.fit(SetStart(frozenset(c.names), c.fit.model) for c in settled)
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
     best = next(iter(search.sets(1, simple=fewer_than is not None)), None)
     for size in sizes:

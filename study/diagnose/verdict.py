@@ -157,7 +157,8 @@ def _decide(
             return one
         # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
         fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
-    search = searched(base, tried, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
+    settled = [row for row in rows if not any(row.fit is c.fit for c in tried)]
+    search = searched(base, tried, settled, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):

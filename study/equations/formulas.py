@@ -12,7 +12,7 @@ from threading import Lock
 from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
-LONGEST = 300  # characters
+CHARACTERS = 300  # at most
 DEEPEST = 40
 ONE_AT_A_TIME = Lock()  # Python before 3.13 counts the depth of a tree that it makes for all threads together
 LARGEST_EXPONENT = 16.0
@@ -31,8 +31,8 @@ class ExpressionError(StudyError):
 
 def parse(text: str) -> ast.expr:
     """Check the outer form of a formula and return its syntax tree."""
-    if len(text) > LONGEST:
-        raise ExpressionError(f"the expression has {len(text)} characters; at most {LONGEST} are read")
+    if len(text) > CHARACTERS:
+        raise ExpressionError(f"the expression has {len(text)} characters; at most {CHARACTERS} are read")
     if not text.isascii() or "\x00" in text:
         raise ExpressionError(f"the expression {text!r} has characters outside plain ASCII")
     try:

@@ -147,6 +147,11 @@ def check(model: Model) -> None:
         if model.modal:
             sentence = "is linear, and 'linear: modal' holds it already; expected nonlinear terms alone"
             expect(entry.term.name not in LINEAR, f"{entry.name} {sentence}")
+    expect(
+        masses or model.modal or not acted,
+        f"no coordinate has inertia; expected {{term: inertia, at: {model.coordinates[0]}}}, or for a component test a "
+        "model without 'coordinates', on a record of its force and of the one displacement across it",
+    )
     for name in () if model.modal else model.coordinates:
         expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
         loose = f"nothing ties the coordinate {name!r} to another or drives it"

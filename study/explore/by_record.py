@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from study.compare import each_record
-from study.compare.across_levels import Level
 from study.compare.comparison import Comparison, across_records, compare
 from study.compare.each_record import Separate
+from study.compare.fitted_coefficients import Level
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.support.errors import StudyError

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
+from study.compare.fitted_coefficients import Level
 from study.explore.page_units import in_percent, in_text, number, with_error
 from study.explore.session import Stage
 from study.support.numbers import RARE, by_chance

@@ -328,6 +328,7 @@ def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> 
 
     What passes through the structure may be a force that the model lacked.
     """
-    left = leftover(fit, prepared) if any(fault.fault == FORCE_NOISE for fault in faults) else None
-    gone = left is not None and force_noise(left, len(FAULTS)) is None
+    forces = [fault.channel for fault in faults if fault.fault == FORCE_NOISE]
+    left = leftover(fit, prepared) if forces else None
+    gone = left is not None and force_noise(left, forces, len(FAULTS)) is None
     return tuple(fault for fault in faults if not (gone and fault.fault == FORCE_NOISE))

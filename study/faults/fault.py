@@ -123,7 +123,9 @@ _SENTENCES: Mapping[str, Callable[[Fault], str]] = {
     CLIPPING: lambda f: f"the {f.channel} is clipped at {_amount(f)}",
     CONVERTER_STEPS: lambda f: f"the {f.channel} comes in steps of {_amount(f)}",
     GAIN_CHANGE: _gain,
-    FORCE_NOISE: lambda f: f"noise of about {_amount(f)} (rms) lies on the measured force",
+    FORCE_NOISE: lambda f: (
+        f"noise of about {_amount(f)} (rms) lies on the {'measured force' if f.channel == 'force' else f.channel}"
+    ),
 }
 
 

@@ -1,9 +1,11 @@
 """Noise on the measured force: what is left is shaped as the structure shapes a force.
 
-The spectrum of what is left is held against two kinds of noise by Whittle's likelihood, each beside white noise on the
-response: noise on the force behind the structure, and noise on the response itself; both white or of first order.
+The spectra of what is left of each sensor are held against two kinds of noise by Whittle's likelihood, each beside
+white noise on the responses: noise on one of the forces behind the structure, and noise on each response itself; all of
+them white or of first order.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -51,29 +53,20 @@ class _Noise:
         return self.error / float(np.sqrt(max(self.amount, 1e-300))) / 2.0
 
 
-def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fault | None:
-    """Noise on the force; None where noise on the response is as likely, by the ratio of the likelihoods.
+def force_noise(left: FittedResidual, forces: Sequence[str], asked: int, repeats: int = REPEATS) -> Fault | None:
+    """Noise on one of these forces; None where noise on the responses is as likely, by the ratio of the likelihoods.
 
     With fewer ``repeats`` its size and colour are those of the first runs.
     """
-    residual = left.both
-    power = _periodogram(residual)
-    turn = 2.0 * np.pi * np.asarray(rfftfreq(len(residual)))[1:-1]
-    on_response = min(_likely(power, _first_order(memory, turn)).cost for memory in MEMORIES)
-    (name,) = left.prepared.record.forces
-    memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[name])), list[_Noise]()
-    for _ in range(repeats):
-        passed = _passed(left, memory, size)
-        if passed is None:
-            break
-        white = passed / _first_order(memory, turn)
-        found = [_likely(power, white * _first_order(m, turn)) for m in MEMORIES]
-        best = min(found, key=lambda noise: noise.cost)
-        if KEPT * (on_response - best.cost) < np.log(asked / ALPHA) or best.power <= (TOLERANCE * left.size) ** 2:
-            return None
-        before, memory, size = (memory, size), MEMORIES[found.index(best)], best.rms
-        if memory == before[0] and abs(size - before[1]) < best.error_of_rms:
-            break
+    each = left.both.reshape(-1, len(left.prepared.outputs))
+    power = _periodogram(each)
+    turn = 2.0 * np.pi * np.asarray(rfftfreq(len(each)))[1:-1]
+    on_responses = sum(
+        min(_likely(own[:, None], _first_order(memory, turn)[:, None]).cost for memory in MEMORIES) for own in power.T
+    )
+    likely = [(name, _on_force(left, name, power, turn, on_responses - np.log(asked / ALPHA) / KEPT, repeats))
+              for name in forces]  # fmt: skip
+    name, found = min(likely, key=lambda one: min((noise.cost for noise in one[1]), default=np.inf))
     if not found:
         return None
     costs = KEPT * np.array([noise.cost for noise in found])  # the rms is that of all colours by how likely each is
@@ -82,30 +75,49 @@ def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fau
     sizes, errors = np.array([noise.rms for noise in found]), np.array([noise.error_of_rms for noise in found])
     value = float(weights @ sizes)
     error = float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
-    explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(residual**2))
+    explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(left.both**2))
     unit = left.prepared.record.units.get(name, "")
     return Fault(FORCE_NOISE, name, value, error, unit, min(explained, 1.0))
 
 
-def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
-    """Spectrum of the response to noise of unit mean square and first order on the force, shape (lines,).
+def _on_force(
+    left: FittedResidual, name: str, power: Floats, turn: Floats, most: float, repeats: int
+) -> list[_Noise]:  # fmt: skip
+    """Noise on a force by its memory; none where it costs more than ``most``, or shows practically nothing."""
+    memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[name])), list[_Noise]()
+    for _ in range(repeats):
+        passed = _passed(left, name, memory, size)
+        if passed is None:
+            break
+        white = passed / _first_order(memory, turn)[:, None]
+        found = [_likely(power, white * _first_order(m, turn)[:, None]) for m in MEMORIES]
+        best = min(found, key=lambda noise: noise.cost)
+        if best.cost > most or best.power <= (TOLERANCE * left.size) ** 2:
+            return []
+        before, memory, size = (memory, size), MEMORIES[found.index(best)], best.rms
+        if memory == before[0] and abs(size - before[1]) < best.error_of_rms:
+            break
+    return found
+
+
+def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Floats | None:
+    """Spectra of the responses to noise of unit mean square and first order on a force, shape (lines, s).
 
     The mean over runs with noise of this rms, of some neighbouring lines: a nonlinear structure answers noise of each
     size and colour and along each motion in another way, and a lightly damped one rings beyond the ends of a part. Runs
     that noise lets escape, or does not move at all, are left out; None where these are all.
     """
-    rng, record = np.random.default_rng(0), left.prepared.record
-    (force,) = record.forces
-    run, quiet = left.run, np.concatenate(left.predicted)[:, 0]
+    rng, record, weights = np.random.default_rng(0), left.prepared.record, np.array(left.prepared.outputs.weights)
+    run, quiet = left.run, np.concatenate(left.predicted)
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
     def logarithm(white: Floats) -> Floats | None:
         noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
         noisy = replace(left.prepared, record=record.with_channels({force: record[force] + size * noise}))
         with suppress(DivergenceError):
-            fitted = run_of(left.fit, noisy).respond({}, left.fit.initial)[0][:, 0]
-            judged = replace(run, prepared=noisy).motions()[:, 0]
-            power = _periodogram((np.concatenate([fitted, judged]) - quiet) / size)
+            fitted = run_of(left.fit, noisy).respond({}, left.fit.initial)[0]
+            judged = replace(run, prepared=noisy).motions()
+            power = _periodogram(weights * (np.concatenate([fitted, judged]) - quiet) / size)
             return np.log(power) if np.all(power > 0.0) else None
         return None
 
@@ -114,12 +126,15 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     if not logarithms:
         return None
     near, whole = np.ones(LINES), np.ones(len(logarithms[0]))
-    smooth = np.convolve(np.mean(logarithms, axis=0), near, "same") / np.convolve(whole, near, "same")
-    return np.exp(smooth + np.euler_gamma)  # whose periodograms scatter as a chi squared of two degrees of freedom
+    beside = np.convolve(whole, near, "same")
+    smooth = [np.convolve(own, near, "same") / beside for own in np.mean(logarithms, axis=0).T]
+    return np.exp(
+        np.stack(smooth, axis=1) + np.euler_gamma
+    )  # whose periodograms scatter as a chi squared of two degrees of freedom
 
 
 def _periodogram(values: Floats) -> Floats:
-    """Mean square by line, shape (lines,), of values whose ends are faded by a split cosine bell (Bloomfield, 1976).
+    """Mean square by line, shape (lines, s), of values (n, s), ends faded by a split cosine bell (Bloomfield, 1976).
 
     Without it what rings at a sharp resonance beyond the ends lies on all other lines, and that alike.
     """
@@ -128,36 +143,44 @@ def _periodogram(values: Floats) -> Floats:
     bell = np.ones(n)
     bell[:edge] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
     bell[n - edge :] = bell[edge - 1 :: -1]
-    return np.abs(np.asarray(rfft(values * bell)))[1:-1] ** 2 / float(np.sum(bell**2))
+    return np.abs(np.asarray(rfft(values * bell[:, None], axis=0)))[1:-1] ** 2 / float(np.sum(bell**2))
 
 
 def _likely(power: Floats, shape: Floats) -> _Noise:
-    """The most likely amount of a shape beside white noise, neither below zero, by Fisher's scoring.
+    """The most likely amount of a shape beside white noise on each sensor, none below zero, by Fisher's scoring.
 
-    A step that does not raise the likelihood (Whittle, 1953) is halved.
+    Both are (lines, s). A step that does not raise the likelihood (Whittle, 1953) is halved. What passes the structure
+    reaches all sensors together, so that s of them tell its amount less well than s records would: the error counts the
+    coherence of their spectra, which the likelihood of each by itself leaves out.
     """
-    level, mean = float(np.mean(shape)), float(np.mean(power))
-    columns = np.column_stack([shape / level, np.ones_like(shape)])
-    amounts = np.array([0.5 * mean, 0.5 * mean])
-    cost = _cost(columns @ amounts, power)
+    lines, count = power.shape
+    level, mean = float(np.mean(shape)), np.asarray(np.mean(power, axis=0), dtype=np.float64)
+    own = np.repeat(np.eye(count), lines, axis=0)
+    columns, spectra = np.column_stack([shape.T.ravel() / level, own]), power.T.ravel()
+    amounts = 0.5 * np.concatenate([[np.mean(mean)], mean])
+    cost = _cost(columns @ amounts, spectra)
     for _ in range(ROUNDS):
-        spectrum = columns @ amounts
-        step = least_squares(columns / spectrum[:, None], power / spectrum) - amounts
+        expected = columns @ amounts
+        step = least_squares(columns / expected[:, None], spectra / expected) - amounts
         tried = [np.maximum(amounts + step / 2**k, SHRINKING * amounts) for k in range(HALVINGS)]
-        better = next((t for t in tried if _cost(columns @ t, power) < cost), None)
+        better = next((t for t in tried if _cost(columns @ t, spectra) < cost), None)
         if better is None:
             break
-        amounts, before, cost = better, cost, _cost(columns @ better, power)
+        amounts, before, cost = better, cost, _cost(columns @ better, spectra)
         if before - cost < 1e-6:
             break
-    spectrum = columns @ amounts
-    information = (columns / spectrum[:, None]).T @ (columns / spectrum[:, None])
-    error = float(np.sqrt(np.linalg.pinv(information)[0, 0] / KEPT))
+    scores = columns / (columns @ amounts)[:, None]
+    inverse = np.asarray(np.linalg.pinv(scores.T @ scores), dtype=np.float64)
+    coherent = (scores[:, :1] * amounts[0] * scores).reshape(count, lines, -1)
+    between = np.asarray(np.sum(coherent, axis=0), dtype=np.float64)
+    together = between.T @ between - np.einsum("ilp,ilq->pq", coherent, coherent)
+    variance = inverse + inverse @ together @ inverse
+    error = float(np.sqrt(variance[0, 0] / KEPT))
     return _Noise(float(amounts[0]) / level, error / level, cost, float(amounts[0]))
 
 
 def _cost(spectrum: Floats, power: Floats) -> float:
-    """The negative logarithm of the likelihood of a periodogram, but for a constant."""
+    """The negative logarithm of the likelihood of periodograms, each by itself, but for a constant."""
     return float(np.sum(np.log(spectrum) + power / spectrum))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
+from study.compare.dependence import left_by, significant_share
 from study.faults.correction import corrected, fault_columns, sensible, unit_of
 from study.faults.fault import (
     ALL_SENSORS,
@@ -60,6 +61,7 @@ ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
 EFFECTS = 3  # of the library that are added before a fault is believed
 STEPS = 8  # of Gauss and Newton
+OF_MOTION = 0.5  # of what is left: where so much depends on the motion, a force is missing rather than noisy
 FAR_APART = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
 NEAR = 0.05  # standard errors: as near the value as the search has to come
 
@@ -113,13 +115,13 @@ class Refined:
 def asked_of(prepared: Prepared, names: Sequence[str], held: Mapping[Asked, float]) -> tuple[Asked, ...]:
     """Where faults of these names are looked for, but for those whose value is known.
 
-    In each sensor. Several sensors may all be late together, against all forces, and of several forces each by itself.
-    Noise on the only force is told from what the only sensor shows.
+    In each sensor, and noise on each force. Several sensors may all be late together, against all forces, and of
+    several forces each by itself.
     """
     sensors, forces = [str(sensor) for sensor in prepared.outputs.sensors], prepared.record.forces
     several = len(sensors) > 1
     late = (ALL_SENSORS, *sensors, *(forces if len(forces) > 1 else ())) if several else sensors
-    where = {DELAY: late, FORCE_NOISE: () if several or len(forces) > 1 else forces}
+    where = {DELAY: late, FORCE_NOISE: forces}
     everywhere = [(name, channel) for name in names for channel in where.get(name, sensors)]
     return tuple(one for one in everywhere if one not in held)
 
@@ -293,12 +295,22 @@ def _line(fault: Fault, left: FittedResidual) -> Columns:
 
 
 def _noisy_force(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> SearchStage | None:
-    """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if FORCE_NOISE not in [name for name, _ in open_ones] or force_noise(stage.rich, asked, repeats=1) is None:
+    """The stage with noise on a force, which is said of what no effect explains; None if it is not seen or known.
+
+    Of several forces on the one where it is most likely: noise on one of them looks much like noise on another.
+    """
+    known = any(fault.fault == FORCE_NOISE for fault in stage.faults)
+    forces = [] if known else [channel for name, channel in open_ones if name == FORCE_NOISE]
+    if not forces or force_noise(stage.rich, forces, asked, repeats=1) is None:
         return None
+    fit = stage.rich.fit
+    if len(fit.model.coordinates) > 1:  # whose many effects at many places take long to be searched for
+        lost = not fit.converged or fit.undecided
+        if lost or significant_share(left_by(fit, stage.rich.prepared), ALPHA) > OF_MOTION:
+            return None
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
-    noise = None if left is None else force_noise(left, asked)
+    noise = None if left is None else force_noise(left, forces, asked)
     if noise is None:
         return None
     effect = missing(stage.rich) if len(stage.effects) < EFFECTS else None

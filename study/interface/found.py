@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from study.interface.planned import PlannedTest
+
 MISSING, NOTHING, UNKNOWN = verdicts.MISSING, verdicts.NOTHING, verdicts.UNKNOWN
 
 
@@ -144,6 +146,31 @@ class Diagnosis:
         found = {c.name: c for c in self.candidates}
         expect(name in found, f"{name!r} is no candidate; expected one of {', '.join(found)}")
         return found[name]
+
+    def plan(
+        self, *, max_force: float | None = None, max_displacement: float | None = None,
+        max_length: float | None = None, precision: Mapping[str, float] | None = None, sensors: Sequence[str] = (),
+    ) -> "PlannedTest":  # fmt: skip
+        """Which test decides between what is tied, or with ``precision={"k3": 0.05}`` tells k3 to 5 %.
+
+        Parameters
+        ----------
+        max_force, max_displacement, max_length : float, optional
+            What the test may not exceed, in the units of the record and in seconds; by default what this record
+            reached.
+        precision : mapping of float, optional
+            A value that is fitted, and the half width of its 95 % interval over the value that is wanted.
+        sensors : sequence of str
+            Those that could be added, as ``floor2 acceleration``; any by default.
+
+        Raises
+        ------
+        StudyError
+            If nothing is tied, the limits allow no test, or there is no such sensor.
+        """
+        from study.interface.planned import planned
+
+        return planned(self.result, (max_force, max_displacement, max_length), precision, sensors)
 
     def table(self) -> Words:
         """The first candidates as ``study diagnose`` prints them."""

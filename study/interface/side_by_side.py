@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.compare import comparison as comparisons
-from study.compare.across_levels import Level
+from study.compare.fitted_coefficients import Level
 from study.interface.fitted import Fit
 from study.interface.showing import drawing_axes, html_table
 from study.support import statistics

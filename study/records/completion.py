@@ -19,7 +19,7 @@ from study.support.autoregression import burg, continued_by
 from study.support.errors import StudyError
 from study.support.units import ROLES, VOLTAGE, parse_unit, role_unit
 
-SHORTEST = 512  # samples by which each end is continued, at least
+CONTINUED = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
 SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
 NEAR_END = 8  # samples at each end where a derivative, or a filter, depends on the continuation
@@ -127,7 +127,7 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     Orders 1 and 2 differentiate, -1 and -2 integrate, 0 only removes what lies below the cut-off. The gain is full
     above the cut-off (in hertz; above zero for an integral), zero below half of it, a raised cosine between.
     """
-    reach = max(SHORTEST, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else SHORTEST
+    reach = max(CONTINUED, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else CONTINUED
     mean = float(np.mean(values))
     longer = with_continuations(values - mean, min(reach, 8 * len(values)))
     size = next_fast_len(len(longer), real=True)

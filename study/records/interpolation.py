@@ -8,7 +8,7 @@ content above its Nyquist frequency.
 import numpy as np
 from scipy.fft import irfft, rfft
 
-from study.records.completion import SHORTEST
+from study.records.completion import CONTINUED
 from study.records.record import Record, Stretch
 from study.support.arrays import Floats, Ints
 
@@ -50,7 +50,7 @@ def closes(values: Floats) -> bool:
 
 def _reflected(values: Floats) -> Floats:
     """A record continued at both ends by point reflection that is faded out, shape (n + 2 edge,)."""
-    edge = min(SHORTEST, len(values) - 1)
+    edge = min(CONTINUED, len(values) - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]

@@ -12,6 +12,7 @@ from study.support.errors import StudyError, expect
 
 Span = tuple[int, int]
 FEWEST = 64  # samples in a part
+QUIET = 0.1  # of the rms motion of the other part
 MOST = 0.5  # of a part: channels that rest for longer do not move in it
 
 
@@ -117,6 +118,12 @@ def _rests(values: Floats) -> bool:
 def driven_apart(record: Record, one: Span, other: Span) -> bool:
     """Whether most of the power in two parts of a record lies at frequencies that the other has not."""
     return shared(record, one, other) < 0.5
+
+
+def falls_silent(record: Record, sensors: Sequence[Sensor], one: Span, other: Span) -> bool:
+    """Whether the motion in one of two parts is so small that noise is much of what a sensor shows there."""
+    sizes = [np.std(record.columns(sensors, span), axis=0) for span in (one, other)]
+    return bool(np.any(np.minimum(*sizes) < QUIET * np.maximum(*sizes)))
 
 
 def shared(record: Record, one: Span, other: Span) -> float:

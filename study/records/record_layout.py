@@ -13,7 +13,7 @@ import numpy as np
 
 from study.records.completion import CompletedRecord, complete
 from study.records.driven_by_motion import with_prescribed_motion
-from study.records.plan import FEWEST, Plan, Span, compared_sensors, driven_apart, make_plan, shared
+from study.records.plan import FEWEST, Plan, Span, compared_sensors, driven_apart, falls_silent, make_plan, shared
 from study.records.prepared import FORCE, Prepared, prepare_record
 from study.records.record import MOTIONS, Record, Sensor, Stretch
 from study.records.sampling_rate import completed_without_spare
@@ -101,11 +101,12 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     if not (turns or layout.use or kind.drifts):
         with at(records[0].name):
             plan = make_plan(records[0], layout.fit, layout.judge, wanted)
-        turns = not (layout.explicit or kind.unbroken) and driven_apart(records[0], plan.fit, plan.judge)
+        silent = falls_silent(records[0], sensors, plan.fit, plan.judge)
+        turns = not (layout.explicit or kind.unbroken) and (silent or driven_apart(records[0], plan.fit, plan.judge))
         if not (turns or anew):
             prepared = prepare_record(records[0], plan, layout.cutoff)
             return replace(prepared, sensors=sensors, notes=(*notes, *prepared.notes))
-        notes += [_why(records[0], plan)] if turns else []
+        notes += [_why(records[0], plan, silent=silent)] if turns else []
     completed = [complete(record, layout.cutoff) for record in records]
     if turns and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
         completed, every = completed_without_spare(completed, sum(len(record) for record in records) // 2)
@@ -163,12 +164,16 @@ def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: Kind
         )
 
 
-def _why(record: Record, plan: Plan) -> str:
-    share = percent(shared(record, plan.fit, plan.judge), ".0f")
-    return (
-        f"the halves of the record share {share} of the force's power at the same frequencies, as those of a sweep or "
-        "of dwells do, so that every other block is judged in place of a half (--fit and --judge A:B choose parts)"
-    )
+def _why(record: Record, plan: Plan, *, silent: bool) -> str:
+    if silent:
+        because = "one half of the record is nearly at rest, so that what is judged there would be noise"
+    else:
+        share = percent(shared(record, plan.fit, plan.judge), ".0f")
+        because = (
+            f"the halves of the record share {share} of the force's power at the same frequencies, as those of a sweep "
+            "or of dwells do"
+        )
+    return f"{because}: every other block is judged in place of a half (--fit and --judge A:B choose parts)"
 
 
 def _samples(record: Record, layout: Layout) -> list[Span]:

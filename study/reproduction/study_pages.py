@@ -16,7 +16,7 @@ from study.support.numbers import percent
 
 Row = Mapping[str, Any]
 TITLE = "The report, run again"
-LONGEST = 110  # characters of a measured number in a table
+TABLE_WIDTH = 110  # characters of a measured number in a table
 WANTED = 0.99  # of the seeds, for each noise-free parameter
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
@@ -174,11 +174,11 @@ def shortened(row: Row) -> str:
     """What was measured, as many parts as the report gives numbers and a line holds."""
     parts = row["measured"].split(SEPARATOR)
     kept = parts[: len(row["reported"].split(", "))]  # "as stated" counts as one number
-    while len(kept) > 1 and len(SEPARATOR.join(kept)) > LONGEST:
+    while len(kept) > 1 and len(SEPARATOR.join(kept)) > TABLE_WIDTH:
         kept = kept[:-1]
     text = SEPARATOR.join(kept)
-    if len(text) > LONGEST:
-        return text[: text.rfind(" ", 0, LONGEST)].rstrip(",;") + " …"
+    if len(text) > TABLE_WIDTH:
+        return text[: text.rfind(" ", 0, TABLE_WIDTH)].rstrip(",;") + " …"
     return text if len(kept) == len(parts) else f"{text} …"
 
 

@@ -13,7 +13,7 @@ from study.support.arrays import Floats
 from study.support.least_squares import length_or_one, normal_inverse
 from study.support.thresholds import BLOCKS
 
-SHORTEST = 16  # samples in a block
+IN_A_BLOCK = 16  # samples in a block
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Gain:
 
 def block_powers(residual: Floats) -> Floats:
     """Sum of squares in each of ``BLOCKS`` blocks of equal length (fewer for a short residual)."""
-    count = max(2, min(BLOCKS, len(residual) // SHORTEST))
+    count = max(2, min(BLOCKS, len(residual) // IN_A_BLOCK))
     size = len(residual) // count
     return np.sum(residual[: size * count].reshape(count, size) ** 2, axis=1)
 
@@ -61,17 +61,17 @@ def gain(before: Floats, after: Floats, *, evenly: bool = False) -> Gain:
 def _of_even_changes(before: Floats, change: Floats) -> Floats:
     """Sum of the products of a residual and a change, in blocks with equal shares of the change's power.
 
-    None is shorter than ``SHORTEST``: what loud ones have more is shared by those that follow.
+    None is shorter than ``IN_A_BLOCK``: what loud ones have more is shared by those that follow.
     """
     peak = float(np.max(np.abs(change)))
     change = change / peak if peak > 0.0 else change  # one that runs far astray would overflow
     power = np.concatenate([np.zeros(1), np.cumsum(change**2)])
-    count, last = max(2, min(BLOCKS, len(change) // SHORTEST)), len(change)
+    count, last = max(2, min(BLOCKS, len(change) // IN_A_BLOCK)), len(change)
     edges = [0]
     while len(edges) < count:
         wanted = power[edges[-1]] + (power[-1] - power[edges[-1]]) / (count - len(edges) + 1)
-        edge = max(int(np.count_nonzero(power < wanted)), edges[-1] + SHORTEST)
-        if edge > last - SHORTEST:
+        edge = max(int(np.count_nonzero(power < wanted)), edges[-1] + IN_A_BLOCK)
+        if edge > last - IN_A_BLOCK:
             break
         edges.append(edge)
     return np.asarray(np.add.reduceat(before * change, edges), dtype=np.float64)
@@ -132,7 +132,7 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0, ke
     scale = length_or_one(jacobian)
     j = jacobian / scale
     inverse = normal_inverse(j.T @ j)
-    count = max(2, min(BLOCKS, len(residual) // SHORTEST))
+    count = max(2, min(BLOCKS, len(residual) // IN_A_BLOCK))
     size = len(residual) // count
     blocks = np.einsum(
         "bsp,bs->bp", j[: size * count].reshape(count, size, -1), residual[: size * count].reshape(count, size)

@@ -13,12 +13,13 @@ from study.support.numbers import SAME_RUN
 Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 LIKE_RIGS = "trials_like_rigs"
+NEXT_TESTS = "trials_of_next_tests"
 TIMES = ("seconds",)  # of another machine, or another hour
 COLUMNS_OF_WORDS = (  # the others hold numbers
     "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
     "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
     "place_first", "tied", "tie_set", "tie_holds", "second_verdict", "second_tie_set", "whole_tie_set", "pair",
-    "remainder", "named", "sets", "trouble",
+    "remainder", "named", "sets", "design", "band", "sensor", "ends_in", "random_design", "random_band", "trouble",
 )  # fmt: skip
 
 
@@ -66,6 +67,17 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "error_after", "error_true", "noise_floor", "seconds", "trouble",
             ),
             ("sets", "holds", "error_after", "error_true", "trouble"),
+        ),
+        NEXT_TESTS: KeptTable(
+            (
+                "test", "seed", "noise", "hidden", "verdict", "tie_set", "asked", "design", "band", "level",
+                "length", "sensor", "promise", "promise_as_was", "decided", "ends_in", "random_design", "random_band",
+                "random_decided", "seconds", "trouble",
+            ),
+            (
+                "tie_set", "asked", "design", "band", "level", "length", "sensor", "promise",
+                "promise_as_was", "decided", "ends_in", "random_design", "random_band", "random_decided", "trouble",
+            ),
         ),
     }
 )  # fmt: skip

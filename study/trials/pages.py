@@ -16,12 +16,18 @@ from study.support.document import Block, Image, Text, table
 from study.trials import rates
 from study.trials.draw import make_trial
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, LIKE_RIGS, STRUCTURES, TRIALS, Row
+from study.trials.kept import BY_TEST, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
 from study.trials.runs import WITH, WITHOUT
 
 HEADING = ("trial", "noise", "hidden", "first", "2 ln (likelihood of the hidden over that of the first)")
 PAGES: Mapping[str, str] = MappingProxyType(
-    {TRIALS: "tool.md", BY_TEST: "kinds_of_tests.md", STRUCTURES: "structures.md", LIKE_RIGS: "like_rigs.md"}
+    {
+        TRIALS: "tool.md",
+        BY_TEST: "kinds_of_tests.md",
+        STRUCTURES: "structures.md",
+        LIKE_RIGS: "like_rigs.md",
+        NEXT_TESTS: "next_test.md",
+    }
 )
 GROUP_HEADINGS: Mapping[str, str] = MappingProxyType({WITHOUT: "without faults", WITH: "with a fault", "": "reached"})
 # What was hidden and what was said: pictures of the counts, as ``figures/`` and docs have them, and their titles.
@@ -30,6 +36,7 @@ CONFUSIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         TRIALS: {"trials_confusion": "What was hidden, and what was said"},
         BY_TEST: {},
         LIKE_RIGS: {},
+        NEXT_TESTS: {},
         STRUCTURES: {
             "trials_of_structures_effects": "Effects: what was hidden and what was said",
             "trials_of_structures_places": "Places: where it was hidden and where it was found",

@@ -14,11 +14,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from study.diagnose.next_test import WORTH
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, LIKE_RIGS, STRUCTURES, TRIALS, Row, rows_of
+from study.trials.kept import BY_TEST, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
@@ -204,6 +205,11 @@ def _effects(*counts: int) -> Member:
     return lambda row: row["hidden"] != "" and (row["hidden"] != NONE) * (row["hidden"].count("+") + 1) in counts
 
 
+def _promised(least: float, most: float = math.inf) -> Member:
+    """Of ties that a test was proposed for: promised so much, and less than the other."""
+    return lambda row: least <= row["promise"] < most
+
+
 def _both(row: Row) -> float:
     return _is("effect_first")(row) * _is("place_first")(row)
 
@@ -271,16 +277,35 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   _is("holds"), "holds"),
             Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
         ),
+        NEXT_TESTS: (
+            Reach("ties that end in the right effect, where 95 % or more was promised", _promised(0.95), _is("decided"),
+                  "sure"),
+            Reach("... where 80 to 95 % was promised", _promised(0.8, 0.95), _is("decided"), "likely"),
+            Reach("... where less was promised", _promised(WORTH, 0.8), _is("decided")),
+            Reach("... where 80 % or more was promised, after a random test that is allowed and as long",
+                  _promised(0.8), _is("random_decided")),
+            Reach("all ties for which a test is proposed, after that", _promised(WORTH), _is("decided")),
+            Reach("... after a random test that is allowed and as long", _promised(WORTH), _is("random_decided")),
+            Reach("ties of which it is said that no allowed test is likely to decide", _promised(0.0),
+                  lambda r: float(r["promise"] < WORTH)),
+            Reach("mean size of the promise, where 80 to 95 % was promised", _promised(0.8, 0.95), _number("promise"),
+                  size=True),
+            Reach("mean size of the promise, where less was promised", _promised(WORTH, 0.8), _number("promise"),
+                  size=True),
+        ),
     }
 )  # fmt: skip
 # Columns of a page.
-GROUPS: Mapping[str, str] = MappingProxyType({TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: ""})
+GROUPS: Mapping[str, str] = MappingProxyType(
+    {TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: "", NEXT_TESTS: ""}
+)
 WANTED: Mapping[str, Wanted] = MappingProxyType(
     {
         STRUCTURES: {
             "first": (0.9,), "first_in_noise": (0.8,), "tied": (0.95,), "nothing": (0.95,), "error": (0.9,),
             "held": (0.95,),
         },
+        NEXT_TESTS: {"sure": (0.9,), "likely": (0.8,)},
         LIKE_RIGS: {"two": (0.85,), "three": (0.75,), "there": (0.95,), "nothing": (0.98,), "holds": (0.95,)},
     }
 )  # fmt: skip

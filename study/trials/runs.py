@@ -27,11 +27,13 @@ from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial,
 from study.trials.effect_sets import as_fitted, steady_ones, truth_of
 from study.trials.effects import HIDDEN
 from study.trials.findings import compared, intervals, tie_set
-from study.trials.kept import BY_TEST, KEPT_TABLES, LIKE_RIGS, STRUCTURES, TRIALS, Row
+from study.trials.kept import BY_TEST, KEPT_TABLES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
 from study.trials.kinds import TESTS
+from study.trials.next_tests import judged_next_test
 from study.trials.rigs import RIG_KINDS
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
+PLANNED = "planned"  # of a test after a tie
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
 
 
@@ -53,7 +55,12 @@ def orders(table: str, settings: TrialSettings) -> list[Order]:
     """Every trial of a kept table; ``settings`` are those of ``trials``."""
     if table == TRIALS:
         return driven_orders(settings)
-    return {STRUCTURES: structure_orders, BY_TEST: orders_of_tests, LIKE_RIGS: rig_orders}[table]()
+    return {
+        STRUCTURES: structure_orders,
+        BY_TEST: orders_of_tests,
+        LIKE_RIGS: rig_orders,
+        NEXT_TESTS: next_test_orders,
+    }[table]()
 
 
 def driven_orders(settings: TrialSettings) -> list[Order]:
@@ -118,9 +125,26 @@ def rig_orders(first: int = 780_001, each: int = 26) -> list[Order]:
     return [Order("", first + i, None, None, None, test=kinds[i % len(kinds)]) for i in range(each * len(kinds))]
 
 
+def next_test_orders(count: int = 120, first: int = 640_001) -> list[Order]:
+    """So many trials of tests whose ties are of equals, for a test that is to end them: a damper is hidden.
+
+    Where one effect is the limit of another, as a steady force of a soft contact, no test ends a tie.
+    """
+    tests, dampers = ("base", "blows", "free_decay"), [name for name in HIDDEN if name.endswith("_damping")]
+    noises = FAMILIES[tests[0]].noises[1:]
+    return [
+        Order(
+            PLANNED, first + i, (dampers[(i // len(tests)) % len(dampers)],), noises[i % len(noises)], None,
+            test=tests[i % len(tests)],
+        )
+        for i in range(count)
+    ]  # fmt: skip
+
+
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
-    judged, nothing = JUDGES.get(order.test, _judged_test), "" if order.test == DRIVEN_MASS else NONE
+    judged = _judged_planned if order.kind == PLANNED else JUDGES.get(order.test, _judged_test)
+    nothing = "" if order.test == DRIVEN_MASS else NONE
     row: Row = {
         "kind": order.kind, "seed": order.seed, "test": order.test, "faults": order.faults, "noise": order.noise,
         "response": order.response, "coordinates": order.coordinates,
@@ -147,6 +171,8 @@ def run_trial(order: Order) -> Row:
 
 def table_of(order: Order) -> str:
     """The kept table that a trial belongs to."""
+    if order.kind == PLANNED:
+        return NEXT_TESTS
     return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES, **dict.fromkeys(RIG_KINDS, LIKE_RIGS)}.get(order.test, BY_TEST)
 
 
@@ -199,6 +225,10 @@ def _judged_test(_: Order, trial: Trial) -> Row:
         standing = [abs(c.value) / c.error for c in true.coefficients if c.term in trial.hidden and c.error]
         row |= {"shown": round(standing[0], 1) if standing else ""} | intervals(true, trial.truth)
     return row
+
+
+def _judged_planned(order: Order, trial: Trial) -> Row:
+    return judged_next_test(trial, order.seed)
 
 
 def _judged_structure(_: Order, trial: Trial) -> Row:

@@ -24,7 +24,7 @@ from study.records.record_layout import KindOfTest, Layout, apart, laid_out, run
 from study.records.sampling_rate import low_passed
 from study.support.errors import expect
 
-ANEW = 1.5  # periods of a structure's decay in a stretch: over more, several effects that are missing hide each other
+ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
 
 
 def made_ready(

@@ -8,11 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from study.compare import noise
-from study.compare.across_levels import across_levels
 from study.compare.comparison import Comparison, across_records, compare
 from study.compare.comparison_report import comparison_summary
 from study.compare.comparison_sentences import comparison_in_words, says_of_all
-from study.compare.fitted_coefficients import Coefficient
+from study.compare.fitted_coefficients import Coefficient, across_levels
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study.compare import decay
-from study.compare.release import at_the_release
+from study.compare.decay import at_the_release
 from tests.public_records import DATA, needs
 
 DT, OMEGA, K3, ZETA, AMPLITUDE = 0.001, 2.0 * np.pi * 37.0, 0.48, 0.005, 220.0

@@ -11,9 +11,10 @@ from study.compare.comparison import compare
 from study.compare.prediction import predict
 from study.diagnose import constancy, diagnosis_report, verdict
 from study.diagnose.adding import added
+from study.diagnose.designs import AS_WAS
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.held_out import HeldOutResidual
-from study.diagnose.separating_test import separating_level
+from study.diagnose.separation import rivals_of
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
@@ -140,7 +141,10 @@ def test_an_interval_without_ends_is_said_all_the_same(of_drag, error):
 
 def test_twins_are_told_apart_by_exciting_harder(of_drag):
     rival = next(c for c in of_drag.candidates if c.name == "cubic_damping")
-    assert separating_level(of_drag.candidates[0], rival, of_drag.comparison.prepared) is not None
+    rivals = rivals_of([of_drag.candidates[0], rival], of_drag.comparison.prepared)
+    samples = len(rivals.present.source)
+    same, louder = (rivals.distances(rivals.present.design(AS_WAS, AS_WAS, samples, level)) for level in (1.0, 4.0))
+    assert np.sum(louder[0, 1]) > 4.0 * np.sum(same[0, 1])
 
 
 def test_a_true_coefficient_is_flat_and_an_imitators_is_not():

@@ -45,7 +45,9 @@ def test_what_is_only_named_makes_no_difference():
 
 
 class Model:
-    """A model that knows the names of its terms."""
+    """A model of a single mass that knows the names of its terms."""
+
+    coordinates = ("",)
 
     def __init__(self, *names: str):
         self.names = names
@@ -164,6 +166,15 @@ def test_the_same_faults_beside_it_change_nothing(monkeypatch: pytest.MonkeyPatc
     found, made = diagnosed(monkeypatch, record, (names, left, 0.05))
     assert len(record.asked) == made == 1
     assert found.accounted is record
+
+
+def test_noise_on_a_force_that_shows_beside_the_effects_alone_is_said(monkeypatch: pytest.MonkeyPatch):
+    """Nothing undoes it: no other diagnosis is made for it, and what was known of it is not said twice."""
+    record = Corrected([], beside=[NOISE])
+    found, made = diagnosed(monkeypatch, record, (ONE, 2.0 * TOLERANCE, 0.05))
+    assert made == 1
+    assert found.faults == (NOISE,)
+    assert diagnosed(monkeypatch, Corrected([NOISE], beside=[NOISE]), (ONE, 0.01, 0.05))[0].faults == (NOISE,)
 
 
 def test_where_the_fuller_model_cannot_be_asked_the_first_diagnosis_stands(monkeypatch: pytest.MonkeyPatch):

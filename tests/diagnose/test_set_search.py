@@ -82,7 +82,7 @@ class Bench:
     def search(self, *, done: bool = False, fewer_than: int | None = None) -> SetSearch:
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES]
         base: Any = None
-        return searched(base, singles, lambda _: done, fewer_than)
+        return searched(base, singles, [], lambda _: done, fewer_than)
 
     def sizes(self) -> set[int]:
         return {len(names) for names, _ in self.fitted}

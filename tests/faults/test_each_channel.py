@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
@@ -53,7 +54,7 @@ def far_off(comparison, truth):
     return max(abs(c.value - truth.values[c.key]) / c.error for c in comparison.coefficients)
 
 
-@pytest.mark.parametrize("fault", [f for f in FAULTS if f != "force_noise"])
+@pytest.mark.parametrize("fault", [f for f in FAULTS if f != "force_noise"])  # of a channel that moves
 def test_a_fault_is_found_in_its_channel_and_the_coefficients_are_right(fault, clean, fuller, truth):
     faulty, known = impose(clean, SECOND, fault, np.random.default_rng(11))
     result = compare_records([faulty], fuller)
@@ -113,6 +114,44 @@ def test_a_force_among_several_is_read_late(truth, fuller):
     (found,) = compare_records([late], replace(fuller, forces=both.forces)).faults
     assert (found.fault, found.channel) == ("delay", "second shaker")
     assert abs(found.value - 1.5) < FAR * found.error
+
+
+@pytest.mark.parametrize("noisy", ["shaker", "second shaker", None])
+def test_noise_on_a_force_is_that_of_the_force_which_has_it(noisy, truth):
+    linear = truth.without_term(JOINT)
+    both = replace(linear, forces=(*linear.forces, ("second shaker", "second")))
+    drives = {
+        name: force(Excitation(level=0.3, cutoff=8.0), 4096, 0.02, seed) for seed, (name, _) in enumerate(both.forces)
+    }
+    quiet, rng = simulate(both, drives, 0.02, Integrator("rk4", 8)), np.random.default_rng(5)
+    kept = {s: x for s, x in quiet.motions.items() if s.motion == "displacement"}
+    record = quiet.with_motions({s: x + 0.005 * np.std(x) * rng.standard_normal(4096) for s, x in kept.items()})
+    size = 0.02 * float(np.std(drives["shaker"]))
+    if noisy is not None:
+        record = record.with_channels({noisy: record[noisy] + size * rng.standard_normal(4096)})
+    found = compare_records([record], both.with_values(dict.fromkeys(both.values))).faults
+    assert [(fault.fault, fault.channel) for fault in found] == ([] if noisy is None else [("force_noise", noisy)])
+    for fault in found:
+        assert abs(fault.value - size) < FAR * fault.error
+        assert fault.error < 0.2 * size
+        assert f"lies on the {noisy}" in fault.says
+
+
+@pytest.mark.long
+def test_noise_on_a_force_is_said_beside_the_effect_that_hid_it(truth, believed):
+    drive, rng = force(Excitation(level=0.6, cutoff=8.0), 4096, 0.02, 1), np.random.default_rng(5)
+    quiet = simulate(truth, {"shaker": drive}, 0.02, Integrator("rk4", 8))
+    kept = {s: x for s, x in quiet.motions.items() if s.motion == "displacement"}
+    record = quiet.with_motions({s: x + 0.003 * np.std(x) * rng.standard_normal(4096) for s, x in kept.items()})
+    size = 0.01 * float(np.std(drive))
+    noisy = record.with_channels({"shaker": drive + size * rng.standard_normal(4096)})
+    accounted = compare_records([noisy], believed)
+    assert accounted.faults == ()  # most of what is left depends on the motion
+    found = diagnose_accounted(accounted)
+    assert found.diagnosis.answer.name == JOINT
+    (fault,) = found.faults
+    assert (fault.fault, fault.channel) == ("force_noise", "shaker")
+    assert fault.value == pytest.approx(size, rel=0.25)
 
 
 def test_values_that_are_known_are_those_of_channels(clean, fuller, truth):

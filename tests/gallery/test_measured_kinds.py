@@ -10,7 +10,9 @@ from scipy.special import ellipk
 from study.commands.climb import climb
 from study.compare.comparison import compare
 from study.compare.prediction import predict
-from study.diagnose.separating_test import advice, separating_level
+from study.diagnose.designs import LET_GO
+from study.diagnose.next_test import next_test
+from study.diagnose.separation import own_limits, rivals_of
 from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY, get
@@ -61,7 +63,10 @@ def test_the_damper_is_hysteretic_before_it_is_any_polynomial(run):
     assert found.candidates[0].name == "hysteresis"
     first, second = found.candidates[:2]
     assert first.gain.explained > 1.3 * max(r.gain.explained for r in found.candidates[1:])
-    assert separating_level(first, second, prepared) == 1.2, "they differ much, and more stroke shows it"
+    rivals = rivals_of([first, second], prepared)
+    found = next_test(rivals, own_limits(rivals.fits, rivals.present, 1.5), rehearsals=0)
+    assert found.choice.promise > 0.9, "they differ much, and more stroke shows it"
+    assert found.rivals.present.prescribed
 
 
 def pendulum():
@@ -92,7 +97,10 @@ def test_more_than_a_decay_is_asked_for_by_its_amplitude():
     names = {"coulomb_friction", "dead_band"}
     found = diagnose(compare(model, prepared), without=[n for n in LIBRARY if n not in names and n not in model])
     assert {r.name for r in found.candidates} == names
-    assert "apart, let it go at 1.2 times this level" in advice(found.candidates, prepared)
+    rivals = rivals_of(found.candidates, prepared)
+    plan = next_test(rivals, own_limits(rivals.fits, rivals.present, 1.5), rehearsals=0)
+    assert plan.choice.design.kind == LET_GO
+    assert plan.choice.design.level > 1.0
 
 
 def by_periods() -> float:

@@ -11,6 +11,7 @@ from study.cli import main
 from study.compare import history
 from study.compare.comparison import compare
 from study.compare.comparison_report import comparison_document
+from study.compare.each_record import separated
 from study.compare.missing_force import MissingForce, unbalanced
 from study.compare.prediction import predict
 from study.equations.free_run import prepare
@@ -319,3 +320,12 @@ def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_
         assert len(shown.of_place(place)["against_u"]) > 0
     assert all(len(shown.of_sensor(sensor)["time"]["t"]) > 1000 for sensor in shown.sensors)
     assert not shown.stiffnesses
+
+
+def test_coefficients_by_record_are_not_asked_beside_modes():
+    text = "name: sheet\ncoordinates: [a]\nforces: {shaker: a}\nlinear: modal\nterms: []\n"
+    records = [
+        record_of(0.01, {"shaker": np.ones(64)}, {Sensor("a", "displacement"): np.ones(64)}, name=n) for n in "xy"
+    ]
+    with pytest.raises(StudyError, match="a sum of modes, which are those of one record"):
+        separated(parse_model(text, Path("sheet.yaml")), records, ["linear_stiffness"])

@@ -23,11 +23,10 @@ from study.identify.time_domain.part_fit import run_of
 from study.records import spectra
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
-from study.records.spectra import Segments
+from study.records.spectra import Segments, segment_length
 from study.support.arrays import Complexes, Floats
 
 Bools = NDArray[np.bool_]
-LONGEST, SHARE = 2048, 6  # samples in a segment at most, and parts of the record
 FAINT = 1e-3  # of the strongest line's force
 
 
@@ -97,7 +96,7 @@ def coefficient_spectra(fit: FreeRunFit, prepared: Prepared) -> tuple[Coefficien
         seen, free = (_relative(prepared, model, e, motion) for motion in (measured, clean))
         instrument += [input_history(item, free) for item in inputs]
         corrected += instruments.inputs_without_noise(inputs, seen, free)
-    cut = Segments(length=min(LONGEST, 2 ** int(np.log2(max((last - first) // SHARE, 16)))))
+    cut = Segments(segment_length(last - first, held=6, fewest=16, most=2048))
     by_sensor = {
         sensor.coordinate: _responses(sensor, [*instrument, *corrected, y[first:last]], prepared.dt, cut)
         for sensor, y in zip(prepared.sensors, prepared.measured.T, strict=True)

@@ -16,14 +16,13 @@ from study.equations.linear_part import acting, linear_keys, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
-from study.records.spectra import Segments, cross_spectra_within
+from study.records.spectra import Segments, cross_spectra_within, segment_length
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import End, Point, minimise, point_at
 
 FAINT, CHANCE = 1e-3, 0.01  # as for a single coordinate: share of the strongest line's force, coherence of noise alone
-LONGEST, SHARE = 2048, 6  # samples in a segment at most, and parts of the record
 LINES = 300  # at most
 CLEAN = 1e-4  # share of a response that counts as its error at least, where there is no noise
 POOR = 0.01  # share of the responses' power: a search that leaves more has ended at a local minimum
@@ -62,7 +61,7 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
     expect(names, f"nothing drives {model.name!r}; expected 'forces' in the model, or values for its linear terms")
     parts = [[p[c] - np.mean(p[c]) for c in (*names, *prepared.outputs.sensors)] for p in _whole_parts(prepared)]
     channels, begins = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)], [len(p[0]) for p in parts]
-    cut = Segments(length=min(LONGEST, 2 ** int(np.log2(max(len(channels[0]) // SHARE, 16)))))
+    cut = Segments(segment_length(len(channels[0]), held=6, fewest=16, most=2048))
     matrix = cross_spectra_within(channels, np.cumsum(begins)[:-1].tolist(), prepared.dt, cut)
     n, g = len(names), matrix.density[1:-1]
     inputs, cross = g[:, :n, :n], g[:, :n, n:]

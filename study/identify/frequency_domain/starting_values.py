@@ -23,7 +23,7 @@ from study.identify.time_domain.told_alone import is_alone, model_alone, prepare
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
-from study.records.spectra import Segments, cross_spectra, cross_spectra_within
+from study.records.spectra import Segments, cross_spectra, cross_spectra_within, segment_length
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares, normal_inverse
@@ -34,7 +34,6 @@ FEWEST_LINES = 4  # two more than mass, damping and stiffness need
 MAIN_LOBE = 5  # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
 SHORT = 512  # samples below which coherence may be missing because the record is short
 CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
-LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, at most and at least, and its share of the record
 PADDED = 4  # times as many lines as samples show, for the peak of a short decay
 FEWEST_WINDOWS = 3  # of a period each, from which a decay is read
 
@@ -66,7 +65,7 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
     """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records."""
     record, response = prepared.record, prepared.response
     part = record.part(*prepared.plan.fit)
-    length = min(LONGEST, 2 ** int(np.log2(max(len(part) // 8, 16))))
+    length = segment_length(len(part), held=8, fewest=16, most=1024)
     found, _ = _lines(part, response, length)
     if prepared.near:
         found = _lines(part, response, _resolving(prepared.near, part, length))[0].around(prepared.near)
@@ -204,7 +203,7 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     if prepared.free:  # the inertia force takes the place of the measured one
         part = part.with_channels({FORCE: -part["acceleration"]})
         inputs = without_inertia(inputs)
-    cut = Segments(length=int(np.clip(2 ** int(np.log2(len(part) / PARTS)), SHORTEST, LONGEST)))
+    cut = Segments(segment_length(len(part), held=12, fewest=64, most=1024))
     channels = [*histories(inputs, part), part["force"]]
     if part.joints:
         matrix = cross_spectra_within(channels, part.joints, part.dt, cut)

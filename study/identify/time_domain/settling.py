@@ -18,8 +18,7 @@ from study.identify.time_domain.stretch_states import POOR, is_poor
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import DivergenceError, StudyError
 
-PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
-SHORTEST, LONGEST = 512, 2048  # samples in that stretch
+PERIODS, STRETCH_LIMITS = 50.0, (512, 2048)  # of motion, and samples, in the stretch where multiple shooting begins
 SHIFT = 0.3  # standard errors by which the integration may shift a coefficient ...
 FINE = 0.05  # ... and where samples were left out: leaving them out is to shift nothing
 ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
@@ -153,7 +152,7 @@ def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: 
         return None
     motions = prepared.measured[slice(*prepared.plan.fit)]
     length = round(PERIODS * 2.0 * np.pi / (slowest_rate(motions, prepared.dt) * prepared.dt))
-    stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
+    stretch = prepared.shortened(int(np.clip(length, *STRETCH_LIMITS)))
     try:
         opened = model.with_values({key: None for key in model.values if key not in held})
         linear = linear_start(opened, prepared)  # a short stretch may hold hardly any motion

@@ -57,7 +57,7 @@ def _junk(values: Floats) -> int:
 
 
 def _rest(channels: list[Floats], still: float = 0.02) -> int:
-    """Samples for which all channels are at rest from the beginning on: less than ``still`` of the liveliest slice scatters."""
+    """Samples for which all channels scatter by less than ``still`` of their liveliest slice, from the beginning on."""
     size = max(len(channels[0]) // SLICES, 2)
     count = len(channels[0]) // size
     blocks = np.stack([x[: count * size].reshape(count, size) for x in channels])
