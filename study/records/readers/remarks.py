@@ -10,8 +10,6 @@ from study.support.arrays import Floats
 from study.support.numbers import enumerated
 
 LEAVING_OUT = "--use "  # the option that follows such a remark
-SLICES = 100  # of a record; what lies far outside all others in the first is no motion ...
-OUTSIDE = 5.0  # ... where it is so many times as far from the middle as anything later
 
 
 def on_units(record: Record, known: Collection[str]) -> tuple[str, ...]:
@@ -46,19 +44,19 @@ def on_samples(record: Record) -> tuple[str, ...]:
     return tuple(filter(None, (sign, left_out if said else None)))
 
 
-def _junk(values: Floats) -> int:
+def _junk(values: Floats, outside: float = 5.0) -> int:
     """Up to which of the first samples some lie far outside of all that come later; 0 where none do."""
-    ends = max(len(values) // SLICES, 1)
+    ends = max(len(values) // 100, 1)  # the first hundredth of the record
     away = np.abs(values - np.median(values))
-    outside = np.flatnonzero(away[:ends] > OUTSIDE * float(np.max(away[ends:])))
-    last = int(outside[-1]) + 1 if len(outside) else 0
-    jumps = last and away[last] < away[last - 1] / OUTSIDE  # a motion that dies away does not end from one to the next
+    beyond = np.flatnonzero(away[:ends] > outside * float(np.max(away[ends:])))
+    last = int(beyond[-1]) + 1 if len(beyond) else 0
+    jumps = last and away[last] < away[last - 1] / outside  # a motion that dies away does not end from one to the next
     return last if jumps else 0
 
 
 def _rest(channels: list[Floats], still: float = 0.02) -> int:
     """Samples for which all channels scatter by less than ``still`` of their liveliest slice, from the beginning on."""
-    size = max(len(channels[0]) // SLICES, 2)
+    size = max(len(channels[0]) // 100, 2)
     count = len(channels[0]) // size
     blocks = np.stack([x[: count * size].reshape(count, size) for x in channels])
     scatter = np.std(blocks, axis=2)
