@@ -4,11 +4,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+STUDY_READY := $(VENV)/.ready-study
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture next_test notebooks docs gallery readme estimators trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture next_test notebooks docs gallery readme estimators trials benchmarks wheel clean
 
-study: $(READY)
+study: $(STUDY_READY)
 	$(BIN)/snakemake -j2
 
 report: study
@@ -68,20 +69,39 @@ estimators: $(READY)
 	$(BIN)/snakemake -j2 estimators
 	$(BIN)/python scripts/estimator_docs.py
 
+benchmarks: $(READY)
+	$(BIN)/python -m benchmarks.ratios
+
+# One wheel for every Python 3 of this platform, which installs without a compiler; cibuildwheel makes those of others.
+wheel: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[wheel]'
+	$(BIN)/python -m build --wheel --outdir dist/built
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m auditwheel repair --wheel-dir dist dist/built/*.whl
+
 # TABLE: trials, trials_by_test, trials_of_structures, trials_like_rigs or trials_of_next_tests.
 TABLE = trials
 trials: $(READY)
 	$(BIN)/snakemake -j2 $(TABLE)
 	$(BIN)/python scripts/trial_docs.py $(TABLE) results/$(TABLE)/trials.csv
 
+define ENVIRONMENT
+@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+  || { echo "study: $(PYTHON) is older than 3.11; name a newer one: make PYTHON=python3.12 study"; exit 2; }
+@$(PYTHON) -m venv $(VENV) \
+  || { echo "study: $(PYTHON) cannot make a virtual environment; on Debian, install python3-venv"; exit 2; }
+endef
+
 $(READY): requirements.lock pyproject.toml $(COMPILED)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
-	  || { echo "study: $(PYTHON) is older than 3.11; name a newer one: make PYTHON=python3.12 study"; exit 2; }
-	@$(PYTHON) -m venv $(VENV) \
-	  || { echo "study: $(PYTHON) cannot make a virtual environment; on Debian, install python3-venv"; exit 2; }
+	$(ENVIRONMENT)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@ $(STUDY_READY)
+
+# The study needs half of that: of the same versions what the workflow asks for.
+$(STUDY_READY): requirements.lock pyproject.toml $(COMPILED)
+	$(ENVIRONMENT)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[workflow]'
 	@touch $@
 
 clean:
-	rm -rf results figures .snakemake report.html site
+	rm -rf results figures .snakemake report.html site dist

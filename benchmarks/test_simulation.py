@@ -1,5 +1,5 @@
-"""Simulation beside SciPy's integrators at equal error; run with `pytest benchmarks/test_simulation.py`, after
-`pip install numba`.
+"""Simulation beside SciPy's integrators at equal error; run with `sh benchmarks/peers.sh pytest
+benchmarks/test_simulation.py`, whose environment has the compiler of their right-hand side.
 
 Everyone integrates the same Duffing record. A SciPy integrator gets the loosest tolerance with which it is at least as
 near to the reference as we are, a compiled right-hand side, and the force between the samples from a table.
@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.integrate import solve_ivp
 
 from study.equations.model_file import read_model
@@ -18,6 +17,7 @@ from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 
+njit = pytest.importorskip("numba", reason="numba comes with 'sh benchmarks/peers.sh'").njit
 DT, SAMPLES, FINE = 0.02, 1024, 64
 TOLERANCES = 10.0 ** -np.arange(3.0, 13.0, 0.5)
 PEERS = ("DOP853", "RK45", "LSODA", "Radau")

@@ -21,7 +21,7 @@ STRUCTURE_RESULTS = ["results/structures.csv", "results/structure_claims.csv"]
 STRUCTURE_TITLES = {case.case: case.title for case in STRUCTURES.cases.values()}
 # Of results/study.html, after those of the report's systems.
 STRUCTURE_PICTURES = [
-    {"file": f"figures/{case.case}_{kind}.png", "system": case.title, "number": "Not in the report", "shows": shows}
+    {"file": f"figures/{case.case}_{kind}.png", "system": "structures", "number": case.title, "shows": shows}
     for case in STRUCTURES.cases.values()
     for kind, shows in STRUCTURE_FIGURES[case.measured].items()
 ]

@@ -9,14 +9,15 @@ TABLE_PAGES = {
     "excitation_reading": "Reading of unit variance",
     "integrator_steps": "Steps of the integrator",
 }
-# Of results/study.html, in the order of the cases: where a figure is, whose it is, and what it shows.
+# Of results/study.html, in the order of the cases: where a figure is, whose it is, and what it shows. Those of structures
+# and of the other chapters of Part II stand in their sections.
 PICTURES = [
     {"file": f"figures/{stem}.png", "system": case.title, "number": stem.replace("_", " ").capitalize() if stem.startswith("figure_") else "Not in the report", "shows": DESCRIBED[kind]}
     for case in STUDY.cases.values()
     for kind, stem in case.figures.items()
-] + STRUCTURE_PICTURES
+]
 DOCUMENTS = ("summary", "estimators", "claims", "structures", "integrator_steps")
-SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", *(f"{name}.md" for name in DOCUMENTS), "study.html")]
+SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", *(f"{name}.md" for name in DOCUMENTS))]
 SUMMARY_RESULTS += [f"results/pages/{name}.html" for name in TABLE_PAGES]
 
 
@@ -44,12 +45,9 @@ rule summary:
         structures=STRUCTURE_RESULTS[0],
         structure_claims=STRUCTURE_RESULTS[1],
         benchmarks=BENCHMARKS,
-        pictures=[picture["file"] for picture in PICTURES],
-        style=[f"study/support/picture_page.{ending}" for ending in ("css", "js")],
         code=CODE["pages"],
     output:
         **{name: f"results/{name}.md" for name in DOCUMENTS},
-        study="results/study.html",
         html=report(
             "results/pages/summary.html",
             caption="captions/summary.rst",
@@ -68,8 +66,32 @@ rule summary:
     params:
         noise=STUDY.noise,
         setting=STUDY.settings.excitations["report"].reading,
-        pictures=PICTURES,
         titles=STRUCTURE_TITLES,
         tables=TABLE_PAGES,
+    script:
+        "../scripts/pages.py"
+
+
+# Both parts on one page with one table of contents.
+rule study_page:
+    input:
+        **{name: f"results/{name}.csv" for name in TABLE_PAGES},
+        case_parameters=[f"results/{case}/parameters.csv" for case in STUDY.cases],
+        structures=STRUCTURE_RESULTS[0],
+        structure_claims=STRUCTURE_RESULTS[1],
+        part_two_claims=PART_TWO_CLAIMS,
+        **{name: f"results/part_two/{name}.csv" for contents in CHAPTERS.values() for name in contents.tables},
+        benchmarks=BENCHMARKS + PART_TWO_BENCHMARKS,
+        pictures=[picture["file"] for picture in PICTURES + STRUCTURE_PICTURES + PART_TWO_PICTURES],
+        style=[f"study/support/picture_page.{ending}" for ending in ("css", "js")],
+        code=CODE["pages"] + CODE["chapters"],
+    output:
+        study="results/study.html",
+        part_two="results/part_two.md",
+    params:
+        noise=STUDY.noise,
+        setting=STUDY.settings.excitations["report"].reading,
+        pictures=PICTURES + STRUCTURE_PICTURES + PART_TWO_PICTURES,
+        titles=STRUCTURE_TITLES,
     script:
         "../scripts/pages.py"

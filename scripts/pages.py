@@ -6,13 +6,13 @@ from typing import Any
 
 import pandas as pd
 
-from study.reproduction import study_pages
+from study.reproduction import study_pages, whole_page
 from study.support import document
 from study.support.document import Picture
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
-WORDS = ("claims", "structure_claims")  # tables in which an empty cell is an empty word
+WORDS = ("claims", "structure_claims", "part_two_claims")  # tables in which an empty cell is an empty word
 OTHERS = ("benchmarks", "pictures", "style", "code")  # inputs that are no tables
 
 
@@ -42,9 +42,11 @@ def main(inputs: Mapping[str, Sequence[str]], outputs: Mapping[str, str], told: 
         elif name == "study":
             drawn = zip(told["pictures"], inputs["pictures"], strict=True)
             pictures = [Picture(p["system"], p["number"], p["shows"], Path(file).read_bytes()) for p, file in drawn]
-            page = study_pages.study_page(results, pictures)
+            page = whole_page.study_page(results, pictures)
         elif name == "html":
             page = document.document_page(study_pages.TITLE, study_pages.titled("summary", results)).encode()
+        elif name in whole_page.WHOLE_DOCUMENTS:
+            page = document.markdown(whole_page.WHOLE_DOCUMENTS[name](results)).encode()
         else:
             page = document.markdown(study_pages.titled(name, results)).encode()
         replace_file(Path(path), page)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from study.compare import history
-from study.reproduction import study_pages
+from study.reproduction import study_pages, whole_page
 from study.support import document
 from study.support.errors import StudyError
 from study.support.workflow_step import one_sentence
@@ -32,6 +32,10 @@ def main(results: Path, readme: Path, docs: Path) -> None:
     table = pd.read_csv(claims, keep_default_na=False).set_index("id")
     for page, mark, names in ((docs / "reproduction.md", "numbers", SHOWN), (readme, "first", FIRST)):
         document.put(page, mark, [study_pages.statements(table.loc[list(names)].reset_index())])
+    if (judged := results / "part_two" / "claims.csv").is_file():
+        said = whole_page.part_two_sentence(pd.read_csv(judged, keep_default_na=False))
+        for page in (docs / "reproduction.md", readme):
+            document.put(page, "part two", [document.Text(said)])
     if (climbed := results / "silverbox" / "history.json").is_file():
         document.put(
             docs / "tool.md", "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])]

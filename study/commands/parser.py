@@ -8,13 +8,30 @@ from typing import NoReturn
 
 from study import __doc__ as summary
 from study import __version__
-from study.commands import add, compare, diagnose, drop, explore, history, plan, report, simulate, terms, trial
+from study.commands import (
+    add,
+    campaign,
+    compare,
+    data,
+    diagnose,
+    drop,
+    explore,
+    export,
+    history,
+    plan,
+    report,
+    simulate,
+    terms,
+    trial,
+)
 from study.commands.command import Command
 from study.support.errors import StudyError
 
 COMMANDS: tuple[Command, ...] = (
     compare.COMMAND, diagnose.COMMAND, plan.COMMAND, report.COMMAND, add.COMMAND, drop.COMMAND, history.COMMAND,
-    explore.COMMAND, terms.COMMAND, simulate.COMMAND, trial.COMMAND,
+    explore.COMMAND,
+    campaign.COMMAND, terms.COMMAND, simulate.COMMAND, export.COMMAND, trial.COMMAND,
+    data.COMMAND,
 )  # fmt: skip
 EXAMPLE = (
     "study compare rig.csv --model rig.yaml      # how good is the model, and where does it fail?\n"

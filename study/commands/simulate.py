@@ -8,7 +8,6 @@ from study.commands.command import Command, finite_number, whole_number
 
 MOST_SAMPLES = 10_000_000
 USUAL, MOST_STEPS = 8, 1000
-TURN = 0.05  # rad
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,10 +71,9 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _enough(rate: float, dt: float) -> int:
-    """Steps per sample in which the linear system, of ``rate`` rad/s at most, turns by no more than :data:`TURN`.
+    """Steps per sample in which the linear system, of ``rate`` rad/s at most, turns by no more than ``TURN``."""
+    from study.equations.simulate import TURN
 
-    An integrator of order four errs by about the fourth power of that: what it leaves would be taken for an effect.
-    """
     return min(max(USUAL, math.ceil(rate * dt / TURN)), MOST_STEPS)
 
 

@@ -133,6 +133,11 @@ class Level:
     moves: bool  # whether that is significant, the number of coefficients accounted for, and above numerical errors
     change: float  # largest less smallest estimate, over the size of their weighted mean
 
+    @property
+    def chance(self) -> str:
+        """The p value in words: one that is next to nothing is not written out."""
+        return f"= {self.p_value:.2g}" if self.p_value > 1e-9 else "< 1e-09"
+
 
 def across_levels(force: Sequence[float], records: Sequence[Sequence[Coefficient]]) -> tuple[Level, ...]:
     """Hold the estimates of several records against each other; what was held is left out.

@@ -81,9 +81,9 @@ def _fault(step: object) -> str:
 
 
 def _fits(value: object) -> bool:
-    """Whether a number is one that a table can show: a float is, a whole number of hundreds of digits is not."""
+    """Whether a number is one that a table can show: finite, and of fewer than hundreds of digits."""
     try:
-        return not isinstance(value, int) or math.isfinite(float(value))
+        return not isinstance(value, int | float) or math.isfinite(value)
     except OverflowError:
         return False
 

@@ -13,6 +13,7 @@ from matplotlib.ticker import LogLocator
 from study.compare.history import label
 from study.figures import page
 from study.figures.styles import in_style
+from study.support.terminal import on_a_line
 
 
 def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
@@ -37,7 +38,10 @@ def history_files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes
     """The picture by file name, in the project's style."""
     with in_style():
         figure, (axes,) = page.empty_page(
-            f"The history of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
+            f"The history of {on_a_line(name)}",
+            "every model so far, judged on what was not fitted",
+            panel=3.0,
+            headed=False,
         )
         figure.subplots_adjust(bottom=0.26)
         errors_by_step(axes, steps)

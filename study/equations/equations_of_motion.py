@@ -84,7 +84,7 @@ class Equations:
         none, rates = self.graph.const(0.0), list[int]()
         against, along = (dict.fromkeys(self.model.coordinates, none) for _ in range(2))
         for entry in self.model.terms:
-            forces, rate = self._unit_forces(entry)
+            forces, rate = self.unit_forces(entry)
             rates += [] if rate is None else [rate]
             direction = entry.place.direction(self.model.coordinates)
             for key, unit in forces:
@@ -95,7 +95,7 @@ class Equations:
                         acting[coordinate] = self.graph.add(acting[coordinate], force)
         return against, along, rates
 
-    def _unit_forces(self, entry: ModelTerm) -> tuple[list[tuple[str, int]], int | None]:
+    def unit_forces(self, entry: ModelTerm) -> tuple[list[tuple[str, int]], int | None]:
         """Force of each component of a term with a unit coefficient, and the rate of the term's own state."""
         names = {name: self.channels[name] for name in entry.term.channels}
         names |= {p.name: self.values[f"{entry.name}.{p.name}"] for p in entry.term.parameters}

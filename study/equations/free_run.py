@@ -272,12 +272,22 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
     return drive, tuple(starts), places
 
 
-@lru_cache(maxsize=8)
 def _between(values: bytes, factor: int, reading: str) -> Floats:
-    """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
+    """A channel between its samples; a diagnosis makes hundreds of runs under the same force.
+
+    Of long ones two are kept: each takes as many megabytes as all else that is known of a record.
+    """
+    long = len(values) * factor > 1 << 24  # bytes
+    return (_between_few if long else _between_many)(values, factor, reading)
+
+
+def _interpolated(values: bytes, factor: int, reading: str) -> Floats:
     fine = between_samples(np.frombuffer(values), factor, reading)
     fine.flags.writeable = False
     return fine
+
+
+_between_many, _between_few = lru_cache(maxsize=8)(_interpolated), lru_cache(maxsize=2)(_interpolated)
 
 
 def predict_response(
@@ -330,12 +340,22 @@ def _rates(model: Model, record: Record, outputs: Outputs) -> Floats:
     states = starting_states(record, outputs, samples.tolist(), coordinates=[name[2:] for name in moved[:n]])
     drive = run.drive[2 * np.array(run.along(samples.tolist()))]
     columns = dict(zip(names[1:], drive.T, strict=False)) | dict(zip(moved, states.T, strict=True))
-    partial = replace(motion.program, outputs=motion.slots[:, 1 : 1 + run.states].ravel())
+    return rates_at(motion, columns | {"t": record.time[samples]}, len(samples))
+
+
+def rates_at(motion: MotionProgram, columns: Mapping[str, Floats], samples: int) -> Floats:
+    """Magnitude of the largest eigenvalue of a motion linearised at each sample, in rad/s, shape (samples,).
+
+    ``columns`` has time, what drives, and states by their names in the program, shape (samples,) each; infinite where
+    the equations are not finite.
+    """
+    n, states = motion.dofs, motion.states
+    partial = replace(motion.program, outputs=motion.slots[: states - n, 1 : 1 + states].ravel())
     with np.errstate(all="ignore"):
-        slopes = kernels.evaluate(partial, columns | {"t": record.time[samples]}, len(samples))
+        slopes = kernels.evaluate(partial, columns, samples)
     if not np.all(np.isfinite(slopes)):
-        return np.full(len(samples), np.inf)
-    jacobian = np.zeros((len(samples), run.states, run.states))
+        return np.full(samples, np.inf)
+    jacobian = np.zeros((samples, states, states))
     jacobian[:, np.arange(n), np.arange(n, 2 * n)] = 1.0
-    jacobian[:, n:] = slopes.reshape(len(samples), -1, run.states)
-    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)
+    jacobian[:, n:] = slopes.reshape(samples, -1, states)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1, initial=0.0), dtype=np.float64)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from study.equations.motion_program import MotionProgram
 
 LIBRARY = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.so'}"
+SOURCES = Path(__file__).parent / "c"
 PROJECT = "reverse-miso-study"
 NO_MEMORY = -2  # what a function returns that found none
 ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and n(umbers)
@@ -41,14 +42,14 @@ class Method(IntEnum):
 
 @cache
 def _function(name: str) -> Any:
-    function = getattr(ctypes.CDLL(str(_library())), name)
+    function = getattr(ctypes.CDLL(str(compiled_library())), name)
     kinds = {"a": ctypes.c_void_p, "w": ctypes.c_int64, "n": ctypes.c_double}
     function.argtypes = [kinds[letter] for letter in ARGUMENTS[name].replace(" ", "")]
     function.restype = ctypes.c_int64
     return function
 
 
-def _library() -> Path:
+def compiled_library() -> Path:
     """The library beside this file, or the installed one: a job on a cluster has sources alone."""
     if LIBRARY.exists():
         return LIBRARY

@@ -129,15 +129,21 @@ def _node(made: Equations, sensor: Sensor) -> int:
     return made.at(sensor.coordinate, MOTIONS.index(sensor.motion))
 
 
-def _jumps(made: Equations) -> list[tuple[int, int, Place]]:
-    """Sign of each relative velocity that a force jumps with, the input that stands for it, and where it is."""
-    graph, found = made.graph, dict[int, tuple[int, Place]]()
+def jumping_signs(made: Equations) -> dict[int, Place]:
+    """Sign of each relative velocity that a force jumps with, and where it is: dry friction, which may stick there."""
+    graph, found = made.graph, dict[int, Place]()
     needed = set(graph.needed(made.slopes))
-    for place in dict.fromkeys(entry.place for entry in made.model.terms if set(entry.place.moving) & set(made.free)):
-        sign = graph.unary(Op.SGN, made.along(place, 1)) if place.kind != "couples" else -1
-        if sign in needed and sign not in found:
-            found[sign] = graph.input(f"side:{place.label}"), place
-    return [(sign, side, place) for sign, (side, place) in found.items()]
+    for place in dict.fromkeys(entry.place for entry in made.model.terms if entry.place.kind != "couples"):
+        sign = graph.unary(Op.SGN, made.along(place, 1))
+        if sign in needed:
+            found.setdefault(sign, place)
+    return found
+
+
+def _jumps(made: Equations) -> list[tuple[int, int, Place]]:
+    """The same with the input that stands for each sign."""
+    signs = jumping_signs(made).items()
+    return [(sign, made.graph.input(f"side:{place.label}"), place) for sign, place in signs]
 
 
 def _orders(made: Equations, place: Place) -> range:

@@ -305,7 +305,8 @@ def tried(session: Session, text: str) -> Session:
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
     known = [FittedCandidate(r.entries, r.fit, r.prediction) for r in now.diagnosis.candidates]
-    silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
+    silent = f"the expression {term.components[0].shape!r} has no finite response on this record; expected one that "
+    silent += "holds the motion or takes energy out of it, such as 'u*abs(u)' or 'v**3'"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
             attempt = candidates.attempt(free(term), search_base(now.comparison))

@@ -5,9 +5,10 @@ white noise on the responses: noise on one of the forces behind the structure, a
 them white or of first order.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -111,7 +112,10 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
     run, quiet = left.run, np.concatenate(left.predicted)
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
-    def logarithm(white: Floats) -> Floats | None:
+    def logarithm(state: Mapping[str, Any]) -> Floats | None:
+        own = np.random.default_rng(0)
+        own.bit_generator.state = state
+        white = own.standard_normal(len(record))
         noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
         noisy = replace(left.prepared, record=record.with_channels({force: record[force] + size * noise}))
         with suppress(DivergenceError):
@@ -121,16 +125,21 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
             return np.log(power) if np.all(power > 0.0) else None
         return None
 
-    drawn = [rng.standard_normal(len(record)) for _ in range(RUNS)]
-    logarithms = [found for found in side_by_side(logarithm, drawn) if found is not None]
-    if not logarithms:
+    drawn = list[Mapping[str, Any]]()  # where the numbers of each run begin: all of them would fill the memory
+    for _ in range(RUNS):
+        drawn.append(rng.bit_generator.state)
+        rng.standard_normal(len(record))
+    total, count = np.zeros(0), 0
+    for found in side_by_side(logarithm, drawn):
+        if found is not None:
+            total, count = total + found if count else found, count + 1
+    if not count:
         return None
-    near, whole = np.ones(LINES), np.ones(len(logarithms[0]))
+    near, whole = np.ones(LINES), np.ones(len(total))
     beside = np.convolve(whole, near, "same")
-    smooth = [np.convolve(own, near, "same") / beside for own in np.mean(logarithms, axis=0).T]
-    return np.exp(
-        np.stack(smooth, axis=1) + np.euler_gamma
-    )  # whose periodograms scatter as a chi squared of two degrees of freedom
+    smooth = [np.convolve(own, near, "same") / beside for own in (total / count).T]
+    # of a periodogram that scatters as a chi squared of two degrees of freedom
+    return np.exp(np.stack(smooth, axis=1) + np.euler_gamma)
 
 
 def _periodogram(values: Floats) -> Floats:

@@ -194,6 +194,27 @@ class Model:
         kept = self if values else self.free()
         replace_file(Path(path), model_file.format_model(kept.equation).encode())
 
+    def export(self, path: str | Path, *, step: float | None = None) -> None:
+        """Write the model for another program: a Python function for ``solve_ivp``, an FMU, or a Modelica class.
+
+        Its values count as in N, m and s: :meth:`Fit.export` knows the units of its record.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, whose suffix says which: ``.py``, ``.fmu`` or ``.mo``.
+        step : float, optional
+            Largest internal step of an FMU in seconds; by default from the fastest oscillation about rest.
+
+        Raises
+        ------
+        StudyError
+            If a value is not known, or something cannot be said in that way: only an FMU has friction that sticks.
+        """
+        from study.export.ways import exported_file, way_of
+
+        replace_file(Path(path), exported_file(self.equation, way_of(Path(path)), step=step))
+
     @property
     def name(self) -> str:
         """What it is called in tables."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
@@ -24,6 +25,7 @@ from study.interface.showing import Words, html_table
 from study.records import record as measured
 from study.records.record_layout import Layout
 from study.support.errors import StudyError, expect
+from study.support.files import replace_file
 from study.support.numbers import percent
 from study.support.yaml_text import shown
 from study.way_in.compare_records import compare_records
@@ -314,6 +316,16 @@ class Fit(FitPictures):
         from study.interface.side_by_side import across
 
         return across([self.given.fit(record, **options) for record in records_of(records)])
+
+    def export(self, path: str | Path, *, step: float | None = None) -> None:
+        """Write the fitted model for another program as :meth:`Model.export` does, with the units of the record.
+
+        A ``StudyError`` if something cannot be said in that way.
+        """
+        from study.export.ways import exported_file, way_of
+
+        content = exported_file(self.model.equation, way_of(Path(path)), self.comparison.record, step)
+        replace_file(Path(path), content)
 
     def page(self) -> bytes:
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""

@@ -1,8 +1,8 @@
 """Seeded force histories, their theoretical autospectra, and the noise on the response.
 
 Every history closes on itself (``periods`` times in the record, swept sines aside) and has no content above its
-cut-off, so that its band-limited interpolation between the samples is exact. Force and noise use two independent
-streams of one seed.
+cut-off but what the ends of sweeps and steps and the flanks of blows add, so that its band-limited interpolation
+between the samples is exact. Force and noise use two independent streams of one seed.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,11 @@ SETTINGS = {  # settings of each kind, beside kind, level and periods
     "pierson_moskowitz": ("peak_frequency", "cutoff"),
     "random_phase_multisine": ("start_frequency", "stop_frequency", "odd_only"),
     "swept_sine": ("start_frequency", "stop_frequency", "sweep"),
+    "gaussian_band": ("start_frequency", "stop_frequency"),
+    "stepped_sine": ("start_frequency", "stop_frequency", "sweep", "steps"),
+    "blows": ("cutoff", "blows"),
 }
+UP_TO_CUTOFF = ("gaussian_lowpass", "pierson_moskowitz", "blows")  # the others run from one frequency to another
 
 
 @dataclass(frozen=True)
@@ -38,12 +42,14 @@ class Excitation:
     kind: str = "gaussian_lowpass"  # a key of ``SETTINGS``
     level: float = 1.0  # mean square of the force in N^2
     reading: str = "raw"  # one of ``READINGS``
-    cutoff: float = 12.5  # highest frequency in Hz of the two random kinds
+    cutoff: float = 12.5  # highest frequency in Hz; of blows the first zero of a blow's spectrum
     peak_frequency: float = 3.0  # where the Pierson-Moskowitz autospectrum has its peak, in Hz
-    start_frequency: float = 0.1  # lower end of the multisine's band; where a sweep begins, which may fall. In Hz
+    start_frequency: float = 0.1  # lower end of a band; where a sweep or its steps begin, which may fall. In Hz
     stop_frequency: float = 12.5
     odd_only: bool = False  # whether the multisine leaves out the even harmonics of its period
     sweep: str = "linear"  # or ``logarithmic``, in frequency
+    steps: int = 12  # frequencies of a stepped sine, each held as long as the others
+    blows: int = 8  # of a hammer, one at random in each of as many equal parts of the period
     periods: int = 1  # how often the same history is repeated in the record
 
     def __post_init__(self) -> None:
@@ -56,29 +62,30 @@ class Excitation:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise StudyError(f"{name} of the excitation is {value:g} Hz; it must be above zero")
-        if self.periods < 1:
-            raise StudyError(f"periods of the excitation is {self.periods}; at least 1 is needed")
+        for name, fewest in (("periods", 1), ("steps", 2), ("blows", 1)):
+            if (count := getattr(self, name)) < fewest:
+                raise StudyError(f"{name} of the excitation is {count}; at least {fewest} is needed")
         if self.start_frequency == self.stop_frequency:
             raise StudyError(
                 f"start_frequency and stop_frequency are both {self.stop_frequency:g} Hz; they must differ"
             )
-        if self.kind == "random_phase_multisine" and self.start_frequency > self.stop_frequency:
+        if self.kind in ("random_phase_multisine", "gaussian_band") and self.start_frequency > self.stop_frequency:
             raise StudyError(
                 f"start_frequency {self.start_frequency:g} Hz lies above stop_frequency {self.stop_frequency:g} Hz; "
-                "the band of a multisine runs from the lower to the higher"
+                f"the band of a {self.kind} runs from the lower to the higher"
             )
 
     @property
     def highest(self) -> float:
         """Highest frequency in Hz that the force holds."""
-        if self.kind in ("gaussian_lowpass", "pierson_moskowitz"):
+        if self.kind in UP_TO_CUTOFF:
             return self.cutoff
         return max(self.start_frequency, self.stop_frequency)
 
     @property
     def lowest(self) -> float:
         """Frequency in Hz below which the force holds nothing."""
-        if self.kind in ("gaussian_lowpass", "pierson_moskowitz"):
+        if self.kind in UP_TO_CUTOFF:
             return 0.0
         return min(self.start_frequency, self.stop_frequency)
 
@@ -236,15 +243,71 @@ def _swept_sine_density(excitation: Excitation, frequency: Floats, _length: int,
     return np.where(inside, excitation.level / (np.where(inside, frequency, low) * np.log(high / low)), 0.0)
 
 
+def _gaussian_band(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
+    """A Gaussian process, as white as its band is wide: both quadratures of every line are random."""
+    lines = _lines(excitation, length, dt)
+    spectrum = np.zeros(length // 2 + 1, dtype=np.complex128)
+    normal = generator.standard_normal((2, len(lines)))
+    spectrum[lines] = 0.5 * length * np.sqrt(excitation.level / len(lines)) * (normal[0] + 1j * normal[1])
+    return irfft(spectrum, length)
+
+
+def _stepped_sine(excitation: Excitation, length: int, dt: float, _random: np.random.Generator) -> Floats:
+    """Whole cycles at each frequency, so that one goes on where the other ends, at zero."""
+    bounds: list[int] = [round(length * k / excitation.steps) for k in range(excitation.steps + 1)]
+    spaced = np.geomspace if excitation.sweep == "logarithmic" else np.linspace
+    wanted = spaced(excitation.start_frequency, excitation.stop_frequency, excitation.steps).tolist()
+    values = np.zeros(length)
+    for begin, end, frequency in zip(bounds, bounds[1:], wanted, strict=False):
+        cycles = max(1, round(frequency * (end - begin) * dt))
+        values[begin:end] = np.sin(2.0 * np.pi * cycles * np.arange(end - begin) / max(end - begin, 1))
+    return np.asarray(np.sqrt(2.0 * excitation.level) * values, dtype=np.float64)
+
+
+def _blows(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
+    """Raised cosines of random height, which end before the period does; the mean square is ``level`` exactly."""
+    width = _blow_samples(excitation, dt)
+    part = length // excitation.blows
+    if part <= 2 * width:
+        raise StudyError(
+            f"{excitation.blows} blows of {width * dt:g} s do not fit into a period of {length * dt:g} s with rests "
+            "between them; take fewer, or a longer record"
+        )
+    pulse, values = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(width) / width), np.zeros(length)
+    for k in range(excitation.blows):
+        begin = k * part + int(generator.integers(part - width))
+        values[begin : begin + width] += generator.uniform(0.5, 1.5) * pulse
+    return np.asarray(values * np.sqrt(excitation.level / np.mean(values**2)), dtype=np.float64)
+
+
+def _blow_samples(excitation: Excitation, dt: float) -> int:
+    return max(4, round(2.0 / (excitation.cutoff * dt)))
+
+
+def _blows_density(excitation: Excitation, frequency: Floats, _length: int, dt: float) -> Floats:
+    """That of one blow, as their heights and times are independent of one another."""
+    width = _blow_samples(excitation, dt)
+    time = np.arange(width) * dt
+    pulse = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(width) / width)
+    transform = np.abs(np.exp(-2j * np.pi * np.outer(frequency, time)) @ pulse) ** 2
+    return np.where(np.abs(frequency) <= 0.5 / dt, 2.0 * dt * excitation.level * transform / np.sum(pulse**2), 0.0)
+
+
 _HISTORIES: dict[str, Callable[[Excitation, int, float, np.random.Generator], Floats]] = {
     "gaussian_lowpass": _gaussian_lowpass,
     "pierson_moskowitz": _pierson_moskowitz,
     "random_phase_multisine": _random_phase_multisine,
     "swept_sine": _swept_sine,
+    "gaussian_band": _gaussian_band,
+    "stepped_sine": _stepped_sine,
+    "blows": _blows,
 }
 _DENSITIES: dict[str, Callable[[Excitation, Floats, int, float], Floats]] = {
     "gaussian_lowpass": _gaussian_lowpass_density,
     "pierson_moskowitz": _pierson_moskowitz_density,
     "random_phase_multisine": _multisine_density,
     "swept_sine": _swept_sine_density,
+    "gaussian_band": _multisine_density,
+    "stepped_sine": _swept_sine_density,
+    "blows": _blows_density,
 }

@@ -129,7 +129,9 @@ def load_config(folder: Path) -> StudyConfig:
         _check_settings(settings)
     cases: dict[str, Case] = {}
     stems: dict[str, str] = {}  # of figures, with whose each is
-    taken = dict.fromkeys(("benchmarks", f"estimators_{settings.estimator_errors.many}"), "a folder of results/")
+    taken = dict.fromkeys(
+        ("benchmarks", "part_two", f"estimators_{settings.estimator_errors.many}"), "a folder of results/"
+    )
     taken |= dict.fromkeys(rules(folder.parent), "a rule")
     for where, case in read_rows(folder / "cases.tsv", Case):
         with at(where):

@@ -53,7 +53,10 @@ class Sampling(Section):
 class ExcitationSettings(Section):
     """A force history; what is left out is as :class:`Excitation` has it, and the seed as the job brings it."""
 
-    kind: Literal["gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "swept_sine"]
+    kind: Literal[
+        "gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "swept_sine", "gaussian_band",
+        "stepped_sine", "blows",
+    ]  # fmt: skip
     reading: Literal["raw", "filtered"] | None = None
     cutoff: Positive | None = None
     peak_frequency: Positive | None = None
@@ -61,6 +64,8 @@ class ExcitationSettings(Section):
     stop_frequency: Positive | None = None
     odd_only: bool | None = None
     sweep: Literal["linear", "logarithmic"] | None = None
+    steps: Annotated[int, Field(ge=2)] | None = None
+    blows: Count | None = None
     periods: Count | None = None
     seed: Seed | None = None
 

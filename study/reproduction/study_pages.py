@@ -11,7 +11,7 @@ from study.figures.styles import look
 from study.reproduction import ensemble
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
 from study.support import document
-from study.support.document import Block, Bullets, Fold, Heading, Image, PageSection, Picture, Text, table
+from study.support.document import Block, Bullets, Fold, Heading, Image, Text, table
 from study.support.numbers import percent
 
 Row = Mapping[str, Any]
@@ -149,13 +149,13 @@ def claim_blocks(results: Results) -> list[Block]:
     return [
         Text(verdict_sentence(results["claims"])), Text(said),
         table(["where", "claim", "report", "ours", "verdict"], rows), Heading("What each verdict rests on"),
-        *claim_folds(results),
+        *claim_folds(results["claims"]),
     ]  # fmt: skip
 
 
-def claim_folds(results: Results) -> list[Block]:
+def claim_folds(claims: pd.DataFrame) -> list[Block]:
     """Every claim, folded."""
-    return [conditions(row) for row in each_row(results["claims"].astype(str))]
+    return [conditions(row) for row in each_row(claims.astype(str))]
 
 
 def conditions(row: Row) -> Fold:
@@ -166,7 +166,9 @@ def conditions(row: Row) -> Fold:
     else:  # a part of one of them has the separator within
         lines = [*(f"must hold: {c}" for c in criteria), *(f"measured: {m}" for m in measured)]
     why = [Text(f"Why: {row['why']}")] if row["why"] else []
-    title = f"**{row['verdict']}** {row['where']}: {row['claim']} (report: {row['reported']})"
+    where = f"{row['where']}: " if row["where"] else ""
+    said = f" (report: {row['reported']})" if row["reported"] else ""
+    title = f"**{row['verdict']}** {where}{row['claim']}{said}"
     return Fold(title, (*why, Bullets(tuple(lines))), row["id"])
 
 
@@ -425,9 +427,9 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], list[Block]], str], ...] = (
     ("verdict", "Verdict", verdict_blocks, "study"),
     ("failing", "What is not reproduced, or only partly, and why", failing_claims, "summary study"),
     ("numbers", "The report's numbers beside ours", numbers, "summary study"),
-    ("claims", "Every claim", claim_folds, "study"),
+    ("claims", "Every claim", lambda results: claim_folds(results["claims"]), "study"),
     ("parameters", "Parameters by case", parameter_blocks, "summary study"),
-    ("structures", "Structures of several coordinates", structure_blocks, "summary study"),
+    ("structures", "Structures of several coordinates", structure_blocks, "summary"),
     ("estimators", "How far each estimator is off", estimator_blocks, "study"),
     ("reading", 'What "unit variance" refers to', reading, "summary study"),
     ("files", "Where everything is", lambda _: [table(["where", "what"], FILES)], "summary"),
@@ -441,7 +443,6 @@ DOCUMENTS: Mapping[str, tuple[str, Callable[[Results], list[Block]]]] = {  # res
     "integrator_steps": ("What the integrator's setting does to the recovered parameters", integrator_blocks),
     "monte_carlo": ("How often each tolerance is met", tolerance_blocks),
 }
-SEARCH = '<input id="search" type="search" placeholder="search the claims" aria-label="search the claims">'
 
 
 def summary_blocks(results: Results) -> list[Block]:
@@ -457,18 +458,6 @@ def titled(name: str, results: Results) -> list[Block]:
     """A page of ``DOCUMENTS`` with its title."""
     title, make = DOCUMENTS[name]
     return [Heading(title, 1), *make(results)]
-
-
-def study_page(results: Results, pictures: Sequence[Picture]) -> bytes:
-    """The whole study for a browser; the pictures, in the order in which they stand, come after the verdict."""
-    sections: list[PageSection] = []
-    for anchor, title, make, pages in SECTIONS:
-        if "study" in pages:
-            search = SEARCH if anchor == "claims" else ""
-            found = search + document.fragment_without_images(make(results))
-            sections.append(PageSection(anchor, title, found))
-    sections.insert(1, PageSection("figures", "Figures", document.picture_groups(pictures)))
-    return document.picture_page(TITLE, sections)
 
 
 def table_page(title: str, rows: pd.DataFrame) -> str:

@@ -27,4 +27,4 @@ def side_by_side(
     with ThreadPoolExecutor(cores()) as pool:
         begun = {i: pool.submit(function, items[i]) for i in hardest_first}
         for i in range(len(items)):
-            yield begun[i].result()
+            yield begun.pop(i).result()  # which nobody holds any longer

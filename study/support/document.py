@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import groupby
 from pathlib import Path, PurePosixPath
 
 from tabulate import tabulate
@@ -22,7 +23,8 @@ table { border-collapse: collapse; margin: 0.6em 0 1.4em; font-size: 13px }
 th, td { text-align: left; vertical-align: top; padding: 0.3em 0.7em; border-bottom: 1px solid #ddd }
 th { border-bottom: 2px solid #888; position: sticky; top: 0; background: white }
 tr:hover td { background: #f4f7fb }
-code { background: #f2f2f2; padding: 0 0.2em }"""
+code { background: #f2f2f2; padding: 0 0.2em }
+img { max-width: 100% }"""
 BOLD, CODE, LINK = r"\*\*(.+?)\*\*", r"`(.+?)`", r"\[(.+?)\]\(([^)]+)\)"
 
 
@@ -58,10 +60,11 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class Image:
-    """A picture in a file of its own; a self-contained page gives its words alone."""
+    """A picture in a file of its own; a self-contained page gives its words, and shows it if it has its bytes."""
 
     words: str
     path: str
+    png: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,9 @@ def _html(block: Block) -> str:
             return f"<p>{_inline(text)}</p>"
         case Bullets(items):
             return "<ul>" + "".join(f"<li>{_inline(item)}</li>" for item in items) + "</ul>"
+        case Image(words, _, png) if png:
+            data = base64.b64encode(png).decode()
+            return f'<p><img alt="{html.escape(words)}" src="data:image/png;base64,{data}"></p>'
         case Image(words, path):
             return f"<p>{_inline(words)}: <code>{html.escape(PurePosixPath(path).name)}</code></p>"
         case Fold(title, blocks, anchor):
@@ -175,6 +181,7 @@ class PageSection:
     anchor: str
     title: str
     content: str  # HTML
+    part: str = ""  # of the page, under which that line has it
 
 
 def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
@@ -183,7 +190,11 @@ def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
         files("study.support").joinpath(f"picture_page.{kind}").read_text(encoding="utf-8").strip()
         for kind in ("css", "js")
     )
-    links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
+    links = "".join(
+        (f"<b>{html.escape(part)}</b>" if part else "")
+        + "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in own)
+        for part, own in groupby(sections, key=lambda s: s.part)
+    )
     body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

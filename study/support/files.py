@@ -57,6 +57,8 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
     try:
         os.stat(f"{target.parent}/.")  # noqa: PTH116  (the dot asks whether it is a folder)
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "a folder is in its place")
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(errno.EACCES, "it is write-protected")
         yield beside

@@ -14,6 +14,11 @@ def harmless(text: str) -> str:
     return OBEYED.sub("?", text)
 
 
+def on_a_line(text: str) -> str:
+    """The same with spaces for tabulators and ends of lines, for which no font of a picture has a sign."""
+    return re.sub(r"[\t\n]", " ", harmless(text))
+
+
 class _Shown:
     """A stream that shows text: harmless, and with a question mark for what its encoding lacks."""
 

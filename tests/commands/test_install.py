@@ -90,6 +90,7 @@ def test_the_wheel_holds_the_package_its_types_and_its_looks(wheel):
 def test_compare_works_without_extras_and_draws_in_the_projects_style(python, tmp_path):
     absent = f"import importlib.util; print([n for n in {EXTRAS!r} if importlib.util.find_spec(n)])"
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    environment["PATH"] = str(python.parent)  # where no compiler is
 
     def run(*words):
         done = subprocess.run(
@@ -108,6 +109,9 @@ def test_compare_works_without_extras_and_draws_in_the_projects_style(python, tm
     said = run("-m", "study", "compare", "rig.csv", "--model", "rig.yaml", "--no-measurement", "--out", "out")
     assert "no page" in said
     assert "explore" in said
+    run("-m", "study", "export", "rig.yaml", "--to", "fmu", "--data", "rig.csv", "--no-measurement")
+    with zipfile.ZipFile(tmp_path / "rig.fmu") as unit:
+        assert any(name.startswith("binaries/") for name in unit.namelist())
     pictures = sorted(path.name for path in (tmp_path / "out").glob("*.png"))
     assert "response.png" in pictures
     svg = (tmp_path / "out" / "response.svg").read_text()

@@ -82,3 +82,43 @@ def test_effects_of_a_structure_are_named_with_their_places():
     diagnosis = {**frame.diagnosis, "candidates": [first]}
     verdicts, _ = told(*campaign.measured_of_row("frame", "hall", frame.comparison, diagnosis))
     assert verdicts.rows[0][5] == "cubic stiffness between low and top or cogging at top"
+
+
+def test_what_differs_is_said_before_the_tables():
+    rows = [measured("a", "beam", 1.0, 355.0, verdict="nothing_missing"), measured("b", "beam", 2.0, 370.0)]
+    rows.append(measured("c", "beam", 3.0, 340.0, verdict="nothing_missing"))
+    (said,) = (b.items for b in campaign.campaign_blocks(rows) if isinstance(b, document.Bullets))
+    assert said[0] == (
+        "**beam: verdicts differ**: nothing is missing in a, c; an effect is missing (cubic stiffness or quintic "
+        "stiffness) in b."
+    )
+    assert said[1].startswith(
+        "**beam: 1 of 1 coefficients differ between the records by more than chance**: k from 340"
+    )
+    assert said[3].startswith("**beam: 1 of 1 coefficients differ between the 2 records in which nothing is missing")
+
+
+def test_sets_and_what_is_known_in_part_are_named():
+    one = measured("a", "beam", 1.0, 355.0, verdict="missing_effects")
+    own = {"effects": [{"term": "cubic_stiffness"}, {"term": "cogging"}], "explained": 0.99, "response_error": 0.01}
+    one = campaign.Measured("a", "beam", one.comparison, {**one.diagnosis, "sets": [own, own]})
+    verdicts, _ = told(one)
+    assert verdicts.rows[0][4:] == (
+        "several effects are missing", "cubic stiffness and cogging (or one of 1 other sets)", "99 %", "1 %",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "day"), [("rig_2026-03-01", (2026, 3, 1)), ("20260301b", (2026, 3, 1)), ("r1", None)])
+def test_the_day_in_a_name(name, day):
+    found = campaign.day_of(name)
+    assert (found and (found.year, found.month, found.day)) == day
+    assert campaign.day_of("2026-13-01") is None
+
+
+@pytest.mark.parametrize("by", ["record", "date", "level"])
+def test_a_picture_shows_the_coefficients_of_several_records(by):
+    rows = [measured(f"rig_2026-0{i}-01", "beam", 4.0 - i, 355.0 + i) for i in (1, 2, 3)]
+    images = [b for b in campaign.campaign_blocks(rows, by) if isinstance(b, document.Image)]
+    assert [image.words for image in images] == [f"coefficients of beam by {by}"]
+    assert images[0].png.startswith(b"\x89PNG")
+    assert "data:image/png;base64," in document.fragment(images)

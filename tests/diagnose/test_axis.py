@@ -1,10 +1,12 @@
 """A mass without a spring drifts in free run; nothing that is asked of it may end in a fault of the program."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import study as st
 from study.compare.comparison import compare
 from study.diagnose.verdict import diagnose
 from study.equations.model import Model, free
@@ -42,3 +44,11 @@ def test_an_axis_that_rests_at_the_end_of_its_way_is_not_called_saturated_and_on
     write_csv(record.with_channels({"displacement": np.minimum(u, limit)}), tmp_path / "cut.csv")
     with pytest.raises(StudyError, match="saturated"):
         read_record(tmp_path / "cut.csv")
+
+
+def test_a_force_of_the_other_sign_shows_no_mass_and_says_what_would() -> None:
+    found = axis()
+    turned = replace(found, channels={**found.channels, "force": -found["force"]})
+    believed = st.Model("inertia", "linear_damping")
+    with pytest.raises(StudyError, match=r"show no mass: their integrals give m = -\d+; expected both positive in the"):
+        believed.fit(st.Record.of(turned), measurement=False)

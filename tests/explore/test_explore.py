@@ -171,6 +171,8 @@ def test_a_formula_is_tried_beside_the_library(asked):
     assert [t.name for t in tried.own] == ["mine"]
     assert "mine" in [r.name for r in tried.now.shown]
     assert sessions.tried(tried, "u*u*v").own[-1].name == "own_1"
+    with pytest.raises(StudyError, match=r"has no finite response on this record; expected one that holds the motion"):
+        sessions.tried(tried, "exp(1e5*u)")
     after = sessions.with_added(tried, "mine").now.comparison
     assert after.prediction.error == pytest.approx(after.prediction.floor, rel=0.1)
 

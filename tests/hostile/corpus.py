@@ -227,6 +227,10 @@ def models() -> Iterator[Case]:
         "log of u": (own.format('"log(u)"'), ("log(u)", "t = ")),
         "too large": (own.format('"u*1e299*t*1e99"'), ("1e299",)),
         "again": (own.format('"2*u"'), ("linear_stiffness",)), "nothing": (own.format('"0*u"'), ("zero",)),
+        "thirty of a kind": (
+            MODEL + "".join(f'  - {{term: own{i}, force: "sin({i + 1}*u)*v**2"}}\n' for i in range(30)),
+            ("'own0'", "own1, own2, own3 and 26 others", "leave some"),
+        ),
         "long": (own.format('"' + "u+" * 600 + 'u"'), ("characters",)),
         "negative damping": (MODEL.replace("- linear_damping", "- {term: linear_damping, value: -9}"), ("c = -9",)),
         "control": (f'name: "{CONTROL.encode("unicode_escape").decode()}"\n{MODEL[10:]}', ("name",)),
@@ -234,7 +238,15 @@ def models() -> Iterator[Case]:
     }  # fmt: skip
     for name, (content, said) in bad.items():
         text = content if isinstance(content, bytes) else content.encode()
-        fits = name in ("no channel", "log of u", "too large", "negative damping", "root of -1", "log of 0")
+        fits = name in (
+            "thirty of a kind",
+            "no channel",
+            "log of u",
+            "too large",
+            "negative damping",
+            "root of -1",
+            "log of 0",
+        )
         if name != "no mass":  # which makes it a test of a component
             yield Case(f"model {name}", ("compare", "rig.csv", "--model", "bad.yaml", *READ), ("bad.yaml", *said),
                        {"bad.yaml": text})  # fmt: skip

@@ -238,7 +238,8 @@ MALFORMED = [
         {"terms": "inertia"}, {"terms": [1]}, {"record": 5}, {"unit": None}, {"rms": "big"}, {"rms": True},
         {"error": 1}, {"error": {"force": "x", "response": 1}}, {"error": {"force": 1}}, {"noise_floor": {}},
         {"added": 3},
-        {"dropped": []}, {"rms": 10**400}, {"error": {"force": 1, "response": [1]}},
+        {"dropped": []}, {"rms": float("nan")}, {"noise_floor": {"response": float("nan")}}, {"rms": float("inf")},
+        {"rms": 10**400}, {"error": {"force": 1, "response": [1]}},
     )),
 ]  # fmt: skip
 

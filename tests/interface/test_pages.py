@@ -67,6 +67,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("page", ["README.md", "docs/howto.md"])
 def test_every_example_of_a_page_runs(page, folder, monkeypatch):
     monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(folder)  # as where Python is started
     matplotlib.use("Agg")
     arrays = st.read("rig.csv")
     names = {"force": arrays["force"], "displacement": arrays["displacement"]}

@@ -16,15 +16,19 @@ KINDS = {
     "odd": Excitation("random_phase_multisine", start_frequency=0.5, stop_frequency=10.0, odd_only=True, periods=2),
     "sweep": Excitation("swept_sine", start_frequency=1.0, stop_frequency=10.0),
     "falling": Excitation("swept_sine", start_frequency=10.0, stop_frequency=1.0, sweep="logarithmic"),
+    "band": Excitation("gaussian_band", level=0.4, start_frequency=0.5, stop_frequency=10.0),
+    "blows": Excitation("blows", level=0.3, blows=64),
+    "steps": Excitation("stepped_sine", start_frequency=1.0, stop_frequency=10.0, steps=64),
 }
-RANDOM = ("raw", "filtered", "waves")
+RANDOM = ("raw", "filtered", "waves", "band")
+SAME_FOR_ALL = ("swept_sine", "stepped_sine")
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_same_seed_same_bytes_and_another_seed_another_force(name: str) -> None:
     settings = KINDS[name]
     assert force(settings, N, DT, 3).tobytes() == force(settings, N, DT, 3).tobytes()
-    if settings.kind != "swept_sine":
+    if settings.kind not in SAME_FOR_ALL:
         other = force(settings, N, DT, 4)
         assert abs(np.corrcoef(force(settings, N, DT, 3), other)[0, 1]) < 6.0 / np.sqrt(2 * 12.5 * N * DT / 10)
 
@@ -86,6 +90,22 @@ def test_low_pass_leaves_the_lines_below_untouched() -> None:
     passed = np.fft.rfft(force(Excitation(cutoff=12.5), N, DT, 5))
     keep = np.fft.rfftfreq(N, DT) <= 12.5
     np.testing.assert_allclose(passed[keep], white[keep], atol=1e-10)
+
+
+def test_a_stepped_sine_holds_each_of_its_frequencies_in_whole_cycles() -> None:
+    x = force(Excitation("stepped_sine", start_frequency=1.0, stop_frequency=10.0, steps=4), N, DT, 0)
+    for part, wanted in zip(x.reshape(4, -1), np.linspace(1.0, 10.0, 4), strict=True):
+        lines = np.abs(np.fft.rfft(part))
+        assert np.fft.rfftfreq(len(part), DT)[np.argmax(lines)] == pytest.approx(wanted, abs=0.5 / (len(part) * DT))
+        assert np.sort(lines)[-2] < 1e-9 * lines.max()
+
+
+def test_blows_are_as_many_as_are_asked_for_and_push_one_way() -> None:
+    x = force(Excitation("blows", blows=8), N, DT, 3)
+    assert np.sum((x[1:] > 0.0) & (x[:-1] == 0.0)) == 8
+    assert x.min() == 0.0
+    with pytest.raises(StudyError, match="do not fit"):
+        force(Excitation("blows", blows=600), N, DT, 3)
 
 
 @pytest.mark.parametrize("samples", [1000, 1001])

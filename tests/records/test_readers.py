@@ -182,6 +182,11 @@ def test_the_motion_of_a_base_is_none_of_the_response(unit: str, tmp_path: Path)
     np.testing.assert_array_equal(read["base_acceleration"], TIME)
 
 
+def test_a_tab_in_the_name_of_a_file_is_a_space_in_that_of_the_record(tmp_path: Path) -> None:
+    write_csv(Record(0.02, {"force": FORCE, "displacement": DISPLACEMENT}), tmp_path / "run\t2.csv")
+    assert read_record(tmp_path / "run\t2.csv").name == "run 2"
+
+
 def test_the_simulator_names_its_records_by_folder(tmp_path: Path) -> None:
     (tmp_path / "duffing").mkdir()
     write_csv(Record(0.02, {"force": FORCE, "displacement": DISPLACEMENT}), tmp_path / "duffing" / "record.csv")

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from study.reproduction import study_pages
+from study.reproduction import study_pages, whole_page
 from study.reproduction.study_pages import LONGEST, conditions, shortened
 from study.support import document
 from study.support.document import Picture
@@ -23,15 +23,19 @@ LONG = pd.DataFrame(
 )  # fmt: skip
 
 
+NO_CLAIMS = pd.DataFrame([], columns=["chapter", *CLAIMS.columns])
+
+
 @pytest.fixture
-def page():
+def page(monkeypatch):
+    monkeypatch.setattr(whole_page, "CHAPTERS", {})
     pictures = [
         Picture("A <system>", "Figure 21", "its path", PNG),
         Picture("Another", "Figure 22", "its other path", PNG),
         Picture("A <system>", "Figure 23", "its coherence", PNG),
     ]
-    results = study(claims=pd.concat([CLAIMS, LONG], ignore_index=True))
-    return study_pages.study_page(results, pictures).decode()
+    results = study(claims=pd.concat([CLAIMS, LONG], ignore_index=True), part_two_claims=NO_CLAIMS)
+    return whole_page.study_page(results, pictures).decode()
 
 
 class Outline(HTMLParser):

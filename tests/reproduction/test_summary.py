@@ -58,11 +58,12 @@ STRUCTURE_CLAIMS = pd.DataFrame(
 )
 
 
-def study(parameters=PARAMETERS, claims=CLAIMS, noise=(("quiet", 0.0), ("noisy", 0.05))):
+def study(parameters=PARAMETERS, claims=CLAIMS, noise=(("quiet", 0.0), ("noisy", 0.05)), **more):
     """Small tables, as the study writes them."""
     tables = {
         "case_parameters": parameters, "claims": claims, "excitation_reading": READING, "estimators": ERRORS,
         "times": TIMES, "structures": STRUCTURES, "structure_claims": STRUCTURE_CLAIMS,
+        **more,
     }  # fmt: skip
     return study_pages.Results(tables, dict(noise), "raw", {"two": "Two <masses>"})
 

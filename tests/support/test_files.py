@@ -99,3 +99,11 @@ def test_a_write_protected_file_is_not_replaced(tmp_path: Path, monkeypatch: pyt
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="No such file or directory"):
         files.replace_file(tmp_path / "none" / "rig.yaml", b"x")
+
+
+def test_a_folder_where_one_of_many_files_goes_is_refused_before_any_is_written(tmp_path: Path) -> None:
+    (tmp_path / "out" / "b.csv").mkdir(parents=True)
+    wanted = dict.fromkeys(("a.csv", "b.csv", "c.csv"), b"x")
+    with pytest.raises(StudyError, match=r"b\.csv: cannot be written \(a folder is in its place\)"):
+        files.write_files(tmp_path / "out", wanted)
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["b.csv"]

@@ -156,8 +156,7 @@ void run_here(Motion *m, double time, const double *drive) {
     m->ran = 1;
 }
 
-/* What is observed of a sample: rows of the states, then those that the program computes; 0 if not finite. */
-static int observe(Motion *m, const int64_t *observed, int64_t count, double *out) {
+int observe(Motion *m, const int64_t *observed, int64_t count, double *out) {
     int64_t own = 0;
     for (int64_t i = 0; i < m->dofs; i++)
         if (!(fabs(m->state[i * m->width]) < FAR && fabs(m->state[(m->dofs + i) * m->width]) < FAR &&
@@ -242,7 +241,7 @@ static int64_t along_adams(
     return ALL_FINITE;
 }
 
-static void forget_motion(Motion *m) {
+void forget_motion(Motion *m) {
     forget_program(&m->program);
     free(m->direct);
     free(m->by_key);
@@ -309,6 +308,18 @@ static int prepare_room(Motion *m) {
     return 1;
 }
 
+int prepare_motion(
+    Motion *m, const int64_t *code, int64_t count, int64_t split, int64_t inputs, int64_t first, double *r,
+    const int64_t *slots, int64_t slot_width
+) {
+    const Friction *f = &m->friction;
+    int64_t changing = 1 + m->drives + m->states;
+    if (!prepare_room(m)) return 0;
+    if (!prepare_program(&m->program, code, count, split, first, r, changing, f->sides, f->places)) return 0;
+    find_derivatives(m, slots, slot_width, inputs, first);
+    return 1;
+}
+
 /*
  * Motions between neighbouring `bounds`, each from its own of the `states` and from its time in `starts`; the states
  * become those where it ends. A motion runs on to the first sample of the next, which overwrites it; the last one does
@@ -332,9 +343,7 @@ EXPORT int64_t integrate(
     int64_t begin = bounds[runs - 1], end = bounds[runs] + 1 < samples ? bounds[runs] + 1 : samples;
     size_t of_row = (size_t)columns * sizeof(double);
     double *last = malloc((size_t)((end - begin) * of_sample + 1) * sizeof(double));
-    if (last && prepare_room(&m) &&
-        prepare_program(&m.program, code, count, split, first, r, 1 + drives + state_count, sides, places)) {
-        find_derivatives(&m, slots, slot_width, inputs, first);
+    if (last && prepare_motion(&m, code, count, split, inputs, first, r, slots, slot_width)) {
         failed = ALL_FINITE;
         for (int64_t i = 0; i < runs && failed == ALL_FINITE; i++) {
             int64_t from = bounds[i], length = i + 1 < runs ? bounds[i + 1] + 1 - from : end - from;

@@ -52,6 +52,20 @@ typedef struct {
     Friction friction;
 } Motion;
 
+/*
+ * Room for a motion whose numbers of states, columns, drives, rows and places with friction stand in it, and its
+ * program, whose registers `r` and instructions stay the caller's. `slots` has of each row its register, and those of its
+ * derivatives. Returns 0 where there is no memory; what there is of the room is given back by `forget_motion`.
+ */
+int prepare_motion(
+    Motion *m, const int64_t *code, int64_t count, int64_t split, int64_t inputs, int64_t first, double *r,
+    const int64_t *slots, int64_t slot_width
+);
+void forget_motion(Motion *m);
+
+/* What is observed where the program has run: rows of the states, then those that it computes; 0 if not finite. */
+int observe(Motion *m, const int64_t *observed, int64_t count, double *out);
+
 /* Program and held signs at `state`; time and drive of the last run if `drive` is 0. */
 void run_here(Motion *m, double time, const double *drive);
 

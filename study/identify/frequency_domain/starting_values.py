@@ -324,5 +324,9 @@ def drift_start(model: Model, prepared: Prepared) -> dict[str, float]:
     found = least_squares(np.concatenate(rows), np.concatenate(targets), 1e-9)
     start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, found.tolist(), strict=True))
     if not start.get("m", 0.0) > 0.0:
-        raise StudyError(f"force and {prepared.response} of {part.name!r} show no mass")
+        raise StudyError(
+            f"force and {prepared.response} of {part.name!r} show no mass: their integrals give m = "
+            f"{start.get('m', 0.0):.3g}; expected both positive in the same direction, a force that moves the body, or "
+            "a model that gives the mass"
+        )
     return start

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.model import Model, ModelTerm
+from study.equations.redundancy import repeated_along
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
@@ -42,7 +43,8 @@ from study.identify.time_domain.told_alone import (
     told_back,
 )
 from study.records.prepared import FORCE, Prepared
-from study.support.errors import StudyError
+from study.records.record import MOTIONS
+from study.support.errors import StudyError, expect
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -362,7 +364,10 @@ def _shapes(entry: ModelTerm, parameters: Sequence[float]) -> dict[str, float]:
 
 
 def _check_own_formulas(model: Model, prepared: Prepared) -> None:
-    """A user's formula must be a number all along the measured motion: a fit that it stops would be blamed else."""
+    """A user's formula must be a number all along the measured motion, and one that the record tells from others.
+
+    A fit that it stops would be blamed else, or take its time to no end.
+    """
     if model.named or all(term.name in LIBRARY for term in model.terms):  # not all of its motions may be measured
         return
     motion = prepared.record.part(*prepared.inner((0, len(prepared.record))))
@@ -370,3 +375,7 @@ def _check_own_formulas(model: Model, prepared: Prepared) -> None:
     for item in reverse_inputs(known):
         if any(name not in LIBRARY for name in item.terms):
             input_history(item, motion)
+    channels = {"u": MOTIONS[0], "v": MOTIONS[1]} | {name: name for name in model.channels}
+    along = {name: motion[channel] for name, channel in channels.items()} | {"t": motion.time}
+    fault = repeated_along(model, along, prepared.record.name)
+    expect(fault is None, f"{fault}")

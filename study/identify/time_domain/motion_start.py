@@ -88,9 +88,11 @@ def delay_along_the_motion(model: Model, prepared: Prepared) -> float:
     both = np.concatenate([lines[..., :-1].real, lines[..., :-1].imag]).reshape(-1, lines.shape[2] - 1)
     basis = np.linalg.qr(both / np.maximum(np.linalg.norm(both, axis=0), np.finfo(float).tiny))[0]
     late = np.arange(-REACH, REACH + STEP, STEP)
-    turned = lines[..., -1:] * np.exp(-2j * np.pi * np.arange(len(lines))[:, None, None] / len(part) * late)
-    turned = np.concatenate([turned.real, turned.imag]).reshape(-1, len(late))
-    explained = np.sum((basis.T @ turned) ** 2, axis=0)
+    explained = list[float]()
+    for samples in late.tolist():  # one by one: all of them would be many times the record
+        turn = np.exp(-2j * np.pi * samples / len(part) * np.arange(len(lines)))
+        turned = lines[..., -1] * turn[:, None]
+        explained.append(float(np.sum((basis.T @ np.concatenate([turned.real, turned.imag]).reshape(-1)) ** 2)))
     most = int(np.argmax(explained))
     return float(late[most]) if 0 < most < len(late) - 1 else float("nan")
 

@@ -23,8 +23,9 @@ def why_no_response(model: Model, prepared: Prepared) -> str:
     if sentence:
         return sentence
     return (
-        f"{model.name!r} has no finite response to the force of {prepared.record.name!r}; expected a model with other "
-        "terms, or values in it that come near those of the record"
+        f"{model.name!r} has no finite response to the force of {prepared.record.name!r} from any start; expected "
+        "terms that hold it (begin with inertia, linear_damping and linear_stiffness, and have 'study diagnose' say "
+        "what is missing), or values in the model that come near those of the record"
     )
 
 

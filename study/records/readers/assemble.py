@@ -15,7 +15,7 @@ from study.records.record import MOTIONS, SI_UNITS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, at, expect
 from study.support.numbers import LAST_DIGITS
-from study.support.terminal import harmless
+from study.support.terminal import on_a_line
 from study.support.units import is_unit, parse_unit, role_unit
 
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
@@ -56,7 +56,7 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     simulated = path.stem == "record"  # as all are called that the simulator writes, each in a folder of its own
     name = path.resolve().parent.name if simulated else path.stem
     name = f"{name}_{options.group.strip('/').replace('/', '_')}" if options.group else name
-    name = harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
+    name = on_a_line(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
     record = Record(
         dt, channels | still, usual | named, name, start, period, coordinates=roles.coordinates, forces=roles.forces
     )

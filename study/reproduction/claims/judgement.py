@@ -59,8 +59,11 @@ def verdict(met: Sequence[bool], words: tuple[str, str, str] = (REPRODUCED, PART
     return words[0 if all(met) else 1 if any(met) else 2]
 
 
-def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
-    """The claim of this id in ``reported.tsv`` with the verdict that its conditions give."""
+def conclude(
+    reported: Reported, name: str, *conditions: Condition,
+    words: tuple[str, str, str] = (REPRODUCED, PARTLY, NOT_REPRODUCED),
+) -> Claim:  # fmt: skip
+    """The claim of this id with the verdict, one of three words, that its conditions give."""
     statement = reported[name]
     conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
     failed = [c for c in conditions if not c.met]
@@ -72,7 +75,7 @@ def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
     return Claim(
         id=name, where=statement.where, claim=statement.what, reported=reported.numbers(name),
         measured=_joined(c.measured for c in conditions), criterion=_joined(c.criterion for c in conditions),
-        verdict=verdict([c.met for c in conditions]), why=why,
+        verdict=verdict([c.met for c in conditions], words), why=why,
     )  # fmt: skip
 
 

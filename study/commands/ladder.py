@@ -1,0 +1,92 @@
+"""A ladder: a measured record compared with model after model, each with a term more, judged on what was not fitted."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+from pydantic import BeforeValidator
+
+from study.commands.measurements import Measurement
+from study.commands.parser import parser
+from study.commands.record_arguments import accounted_together, read_records
+from study.compare.comparison import Comparison, compare
+from study.equations.model import free
+from study.equations.model_file import read_model
+from study.equations.terms import get
+from study.support.config_files import TableRow, Text, read_rows
+from study.support.errors import StudyError, at, expect
+
+COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
+
+
+class Ladder(TableRow):
+    """A row of ``config/ladders.tsv``."""
+
+    record: Text  # of ``config/measurements.tsv``
+    terms: Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]  # one by one
+    fit: str  # samples that are fitted, in the words of the command line, where a part of those of the row is enough
+    published: Text  # what the literature reaches or knows
+
+
+def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[str, Ladder]:
+    """Read ``ladders.tsv`` of a folder; whether the data are there is not asked."""
+    found: dict[str, Ladder] = {}
+    for where, row in read_rows(folder / "ladders.tsv", Ladder):
+        with at(where):
+            known = ", ".join(measurements)
+            expect(row.record in measurements, f"{row.record!r} is no record of measurements.tsv; known are {known}")
+            expect(row.record not in found, "the record stands twice; expected each once")
+            for name in row.terms:
+                get(name)
+        found[row.record] = row
+    return found
+
+
+def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
+    """Errors of every step on the judged samples: relative, in the response's unit, and the noise floor.
+
+    Faults of the measurement are corrected as the first model has them, as a climb begins. A step whose model cannot be
+    fitted has the reason as its note.
+    """
+    options = _with_fit(row.options, ladder.fit)
+    model = read_model(Path(row.model))
+    arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
+    records, rows = read_records(arguments, model), list[dict[str, Any]]()
+    found: Comparison | None = None
+    for step in range(len(ladder.terms) + 1):
+        if step:
+            model = model.with_term(free(get(ladder.terms[step - 1])))
+        about = {
+            "record": row.record, "title": title, "step": step,
+            "added": ladder.terms[step - 1] if step else "", "published": ladder.published,
+        }  # fmt: skip
+        try:
+            found = (
+                accounted_together(arguments, model, records, Path(row.paths[0])).comparison
+                if found is None else compare(model, found.prepared)
+            )  # fmt: skip
+        except StudyError as error:
+            rows.append({**about, "note": str(error)})
+            continue
+        worst = found.worst
+        rows.append({
+            **about, "error": worst.error, "rms": worst.error * worst.size,
+            "unit": found.record.units.get(str(worst.sensor), ""), "floor": found.prediction.floor, "note": "",
+        })  # fmt: skip
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _with_fit(options: Sequence[str], fit: str) -> list[str]:
+    """The options with other samples to fit, where some are given."""
+    words = list(options)
+    if fit:
+        words[words.index("--fit") + 1] = fit
+    return words
+
+
+def missing_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
+    """The one row of a record whose file is not there."""
+    note = f"{row.paths[0]} is not there"
+    told = {"record": row.record, "title": title, "step": 0, "added": "", "published": ladder.published, "note": note}
+    return pd.DataFrame([told], columns=COLUMNS)

@@ -1,0 +1,1 @@
+"""A model where it goes on: as a Python function, an FMU, a Modelica class."""
