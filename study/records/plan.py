@@ -121,9 +121,10 @@ def driven_apart(record: Record, one: Span, other: Span) -> bool:
 
 
 def falls_silent(record: Record, sensors: Sequence[Sensor], one: Span, other: Span) -> bool:
-    """Whether one of two parts has nearly all the power of a motion: noise is much of what the other shows."""
+    """Whether one of two parts has nearly all the power of every motion: noise is much of what the other shows."""
     first, second = (np.var(record.columns(sensors, span), axis=0) for span in (one, other))
-    return bool(np.any(np.minimum(first, second) < (1.0 - ENOUGH) * np.maximum(first, second)))
+    little = 1.0 - ENOUGH
+    return bool(np.all(first < little * second) or np.all(second < little * first))
 
 
 def shared(record: Record, one: Span, other: Span) -> float:
