@@ -17,6 +17,7 @@ from study.commands.record_arguments import (
 )
 
 if TYPE_CHECKING:
+    from study.compare.each_record import Separate
     from study.diagnose.confirmed_faults import Diagnosed
     from study.diagnose.needless import Needless
     from study.equations.model import Model
@@ -26,40 +27,30 @@ if TYPE_CHECKING:
 PAGE = "explore.html"
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add_record_arguments(parser)
-    add_each_record_argument(parser)
+def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is asked for beside the effects of the library, and what is not."""
     parser.add_argument(
-        "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
-    )
-    parser.add_argument(
-        "--each", action="store_true", help="of several records, a verdict each, not one on all of them"
-    )
+        "--candidate", action="append", default=[], metavar="NAME=FORMULA",
+        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter that is fitted",
+    )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 
 
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add_record_arguments(parser)
+    add_each_record_argument(parser)
+    add_diagnosis_arguments(parser)
+    parser.add_argument("--each", action="store_true", help="a verdict for each record, instead of one for all")
+
+
 def _run(arguments: argparse.Namespace) -> None:
-    from study.diagnose.user_candidates import own_candidates
-    from study.equations import terms
-    from study.equations.model_file import read_model
-    from study.faults.fault import settings_beside
     from study.support.errors import expect
     from study.support.files import write_files
 
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
     folder = out_folder(arguments)
-    model = read_model(arguments.model)
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
-    )
-    own = own_candidates(arguments.candidate, model)
-    for name in arguments.without:
-        terms.get(name)
+    model, own, records = asked(arguments)
     files: dict[str, bytes] = {}
-    records = read_records(arguments, model)
-    for path in arguments.records:
-        settings_beside(path)  # what is wrong there is said before the work begins
     if not arguments.each:  # one verdict on one structure
         files = _diagnosed(model, records, arguments.records[0], arguments, own)
     for record, path in zip(records, sources(arguments), strict=True) if arguments.each else ():
@@ -69,6 +60,47 @@ def _run(arguments: argparse.Namespace) -> None:
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 
+def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Record]]":
+    """The model, the user's own candidates and the records, what is wrong with them said before the work begins."""
+    from study.diagnose.user_candidates import own_candidates
+    from study.equations import terms
+    from study.equations.model_file import read_model
+    from study.faults.fault import settings_beside
+    from study.support.errors import expect
+
+    model = read_model(arguments.model)
+    expect(
+        not (arguments.each_record and model.named),
+        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
+    )
+    own = own_candidates(arguments.candidate, model)
+    for name in arguments.without:
+        terms.get(name)
+    records = read_records(arguments, model)
+    for path in arguments.records:
+        settings_beside(path)
+    return model, own, records
+
+
+def diagnosed_together(
+    arguments: argparse.Namespace, model: "Model", records: "list[Record]", path: Path, own: "list[Term]"
+) -> "tuple[Diagnosed, tuple[Separate, ...]]":
+    """The diagnosis of one record, or of several together, and the coefficients that may differ between them."""
+    from study.compare.comparison import STEPS
+    from study.diagnose.confirmed_faults import diagnose_accounted
+    from study.diagnose.user_candidates import check_on
+
+    name = ", ".join(record.name for record in records)
+    with progress("step", STEPS, name) as step:
+        model, marked, separate = separated_records(arguments, model, records)
+        accounted = accounted_together(arguments, model, marked, path, progress=step)
+    with progress(" fits", name=name) as step:
+        check_on(accounted.comparison.record, own)
+        without = tuple(arguments.without)
+        found = diagnose_accounted(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
+    return found, separate
+
+
 def _diagnosed(
     model: "Model", records: "list[Record]", path: Path, arguments: argparse.Namespace, own: "list[Term]"
 ) -> dict[str, bytes]:  # fmt: skip
@@ -76,7 +108,6 @@ def _diagnosed(
     from study.compare import each_record
     from study.compare.each_record import levels_by_record
     from study.diagnose import diagnosis_report
-    from study.diagnose.confirmed_faults import diagnose_accounted
     from study.diagnose.diagnosis_files import (
         diagnosis_files,
         diagnosis_in_words,
@@ -84,26 +115,21 @@ def _diagnosed(
         unneeded_in_words,
     )
     from study.diagnose.needless import needless
-    from study.diagnose.user_candidates import check_on, unfitted
+    from study.diagnose.user_candidates import unfitted, unfitted_in_words
 
+    found, separate = diagnosed_together(arguments, model, records, path, own)
+    diagnosis, comparison, faults = found.diagnosis, found.accounted.comparison, found.faults
+    with progress(" terms"):
+        unneeded = needless(comparison)
+    untried, words = unfitted(diagnosis, own), diagnosis_in_words(diagnosis)
     name = ", ".join(record.name for record in records)
-    with progress(" candidates", name=name) as step:
-        model, marked, separate = separated_records(arguments, model, records)
-        accounted = accounted_together(arguments, model, marked, path)
-        check_on(accounted.comparison.record, own)
-        without = tuple(arguments.without)
-        found = diagnose_accounted(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
-        diagnosis, accounted = found.diagnosis, found.accounted
-        unneeded = needless(accounted.comparison)
-        untried = unfitted(diagnosis, own)
-        words, faults = diagnosis_in_words(diagnosis), found.faults
     print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.candidate_table(diagnosis))
     if table := diagnosis_report.set_table(diagnosis):
         print(f"\n{table}")
-    for effect, why in untried.items():
-        print(f"{effect} could not be fitted: {why}")
-    levels = levels_by_record(accounted.comparison, separate, records)
+    for sentence in unfitted_in_words(untried):
+        print(sentence)
+    levels = levels_by_record(comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
     if model.named:
@@ -114,11 +140,11 @@ def _diagnosed(
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
     files = diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
-    return files | (_page(found, unneeded) if model.named else {})
+    return files | _page(found, unneeded)
 
 
 def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
-    """What is missing of a structure, and where, to be looked at place by place; none without what draws it."""
+    """What is missing, of a structure place by place, as a page to look at; none without what draws it."""
     from study.support.extras import lacking
 
     if lacking("bokeh", PAGE, "explore"):

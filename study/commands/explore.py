@@ -1,4 +1,4 @@
-"""``study explore``: the four steps on a page in the browser."""
+"""``study explore``: compare, diagnose, add and save on a page in the browser."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -84,7 +84,7 @@ def _ready(address: str, browser: bool) -> None:
 
 
 COMMAND = Command(
-    "explore", "the four steps on a page in the browser",
+    "explore", "compare, diagnose, add and save on a page in the browser",
     "study explore rig.csv --model rig.yaml\n"
     "  study explore low.csv mid.csv high.csv --model rig.yaml  # one model on all, and each record by itself\n"
     "  study explore rig.csv --model rig.yaml --port 5100 --no-browser",

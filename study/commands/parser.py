@@ -19,6 +19,7 @@ from study.commands import (
     export,
     history,
     plan,
+    report,
     simulate,
     terms,
     trial,
@@ -27,7 +28,8 @@ from study.commands.command import Command
 from study.support.errors import StudyError
 
 COMMANDS: tuple[Command, ...] = (
-    compare.COMMAND, diagnose.COMMAND, plan.COMMAND, add.COMMAND, drop.COMMAND, history.COMMAND, explore.COMMAND,
+    compare.COMMAND, diagnose.COMMAND, plan.COMMAND, report.COMMAND, add.COMMAND, drop.COMMAND, history.COMMAND,
+    explore.COMMAND,
     campaign.COMMAND, terms.COMMAND, simulate.COMMAND, export.COMMAND, trial.COMMAND,
     data.COMMAND,
 )  # fmt: skip

@@ -37,7 +37,9 @@ def add_record_arguments(
     """Records and a model, how to read them, what to fit and what to judge, and where results go."""
     parser.add_argument("records", type=Path, nargs=nargs, metavar="RECORD", help="CSV, MATLAB, HDF5, UFF or Parquet")
     add_reading_arguments(parser)
-    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument(
+        "--model", type=Path, required=True, help="model file (YAML); values in it are held, but those with held: false"
+    )
     add_out_argument(parser, out)
 
 
@@ -45,8 +47,7 @@ def add_each_record_argument(parser: argparse.ArgumentParser) -> None:
     """Coefficients that are to differ between records that are fitted together."""
     parser.add_argument(
         "--each-record", action="append", default=[], metavar="TERM",
-        help="a term or coefficient that may differ between the records, to which one model is fitted: all others are "
-        "shared",
+        help="a term or coefficient that may differ between the records; one fit shares all others",
     )  # fmt: skip
 
 
@@ -63,6 +64,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="column of force, displacement, velocity, acceleration, time, or of a further channel; by name or number",
     )  # fmt: skip
     reading.add_argument("--unit", action="append", default=[], metavar="ROLE=UNIT", help="such as force=kN")
+    reading.add_argument(
+        "--scale", action="append", default=[], metavar="ROLE=FACTOR",
+        help="factor on the numbers of a column: -1 for a force of the wrong sign; --unit is then that of the product",
+    )  # fmt: skip
     rate = reading.add_mutually_exclusive_group()
     rate.add_argument("--fs", type=finite_number(above=0.0), help="sampling rate in Hz, if there is no column of times")
     rate.add_argument("--dt", type=finite_number(above=0.0), help="sampling interval in s, instead of --fs")
@@ -71,21 +76,20 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder or structure of an HDF5 or MATLAB file; several are a record each",
     )  # fmt: skip
     reading.add_argument("--period", type=whole_number(2, 2**40), help="samples in a period of a periodic excitation")
+    reading.add_argument("--accept-saturated", action="store_true", help="accept a channel that stays at its limit")
     reading.add_argument(
-        "--accept-saturated", action="store_true", help="take a channel that rests at its extreme for what it is"
-    )
-    reading.add_argument(
-        "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
+        "--accept-swapped", action="store_true", help="accept force and response as named, though they seem exchanged"
     )
     reading.add_argument(
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
     reading.add_argument(
         "--as-sampled", action="store_true",
-        help="use all samples of a driven response, though its motion asks for fewer; they always are in free decays, "
-        "components, motions without a spring, and beside --use",
+        help="use all samples, though fewer would do (as is always done in decays, components, axes and with --use)",
     )  # fmt: skip
-    reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
+    reading.add_argument(
+        "--free", action="store_true", help="a free decay: no force acts, and a column of it is ignored"
+    )
     reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )
@@ -109,6 +113,16 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--horizon", type=finite_number(above=0.0), metavar="S",
         help="of a mass without a spring, whose motion drifts: fit and judge it over S seconds from a state of its own "
         "(default: some periods of its motion)",
+    )  # fmt: skip
+
+    judging.add_argument(
+        "--near", type=finite_number(above=0.0), metavar="HZ",
+        help="of a record that shows several modes, the one near this frequency: the fit of a single mass begins there",
+    )  # fmt: skip
+
+    judging.add_argument(
+        "--up-to", type=finite_number(above=0.0), metavar="HZ",
+        help="use what lies below this frequency alone, where a record shows modes that the model does not have",
     )  # fmt: skip
 
 
@@ -150,9 +164,23 @@ def given_options(arguments: argparse.Namespace, group: str | None = None) -> "R
     return ReadOptions(
         {role: int(name) if name.isdecimal() and len(name) < DIGITS else name for role, name in columns.items()},
         assignments(arguments.unit, "--unit"),
+        scale=_factors(arguments.scale),
         group=group if group is not None or not groups else groups[0],
         **{name: getattr(arguments, name) for name in GIVEN},
     )
+
+
+def _factors(texts: "Sequence[str]") -> dict[str, float]:
+    """What ``--scale`` gives, as numbers."""
+    from study.records.readers import assignments
+
+    factors: dict[str, float] = {}
+    for role, text in assignments(texts, "--scale").items():
+        try:
+            factors[role] = float(text)
+        except ValueError:
+            raise StudyError(f"--scale {role}={text} is no number; expected a factor such as {role}=-1") from None
+    return factors
 
 
 def read_records(arguments: argparse.Namespace, model: "Model") -> list["Record"]:
@@ -185,6 +213,8 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
         alternate,
         arguments.response,
         arguments.cutoff,
+        arguments.near,
+        arguments.up_to,
         arguments.as_sampled,
         arguments.horizon,
     )

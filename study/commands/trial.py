@@ -76,7 +76,7 @@ def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
 
 
 COMMAND = Command(
-    "trial", "write a record with a hidden effect, and its answer sealed apart",
+    "trial", "write a practice record with a hidden effect, its answer in a file apart",
     "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
     "  study trial --seed 8 --fault any\n"
     "  study trial --seed 9 --test free_decay\n"

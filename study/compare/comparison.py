@@ -20,13 +20,14 @@ from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
 from study.compare.prediction import Prediction, SensorPrediction, predict
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import Modes, is_positive, modes_of
+from study.equations.linear_part import LINEAR, Modes, is_positive, modes_of
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.rivals import best_first, rivals
 from study.identify.time_domain.smoothness import smoothed
 from study.identify.time_domain.weighted_fit import weighted
@@ -42,6 +43,11 @@ Value = tuple[float, float, str]  # value, standard error (not a number where it
 CHAOTIC = (
     "the fitted system magnifies disturbances, as a chaotic one does: one free run would lose the measured motion "
     "however true the model, so it is fitted and judged in segments, each from a state of its own"
+)
+
+ASTRAY = (
+    "no single free run of this model follows the motion, so it is fitted and judged in segments, each from a state of "
+    "its own: a term is missing, or the channels are not what they are taken for"
 )
 
 
@@ -190,11 +196,19 @@ def compare(
     judged = _judged(
         fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
     )
-    said = [CHAOTIC if fit.restarts else "", rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit)]
+    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit)]
     return Comparison(
         model=model, prepared=prepared, fit=fit, found=found, notes=(*prepared.notes, *filter(None, said)),
         estimator=estimator, **judged,
     )  # fmt: skip
+
+
+def _why_in_segments(fit: FreeRunFit, prepared: Prepared) -> str:
+    """Why a fit is one of segments; empty if it is none. A linear system is never chaotic."""
+    if not fit.restarts:
+        return ""
+    linear = all(entry.term.name in LINEAR for entry in fit.model.terms)
+    return CHAOTIC if not linear and is_chaotic(fit, prepared) else ASTRAY
 
 
 def _of_a_structure(fit: FreeRunFit) -> list[str]:

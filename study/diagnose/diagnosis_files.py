@@ -16,6 +16,8 @@ from study.diagnose.verdict import NOTHING, Diagnosis
 from study.equations.linear_part import modes_table
 from study.faults import fault
 from study.faults.fault import Fault
+from study.records.record import Record
+from study.support.numbers import enumerated
 
 
 def diagnosis_in_words(diagnosis: Diagnosis) -> str:
@@ -26,6 +28,12 @@ def diagnosis_in_words(diagnosis: Diagnosis) -> str:
     said += [f"{note[0].upper()}{note[1:]}." for note in choices_in_words(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
+
+
+def all_names(record: Record) -> str:
+    """The name of a record, or those of all that it is strung together of."""
+    names = list(dict.fromkeys(stretch.source.name for stretch in record.stretches)) or [record.name]
+    return enumerated(names if len(names) <= 3 else [*names[:2], f"{len(names) - 2} more"])
 
 
 def choices_in_words(notes: Sequence[str]) -> list[str]:
@@ -69,7 +77,7 @@ def diagnosis_files(
     content |= {"measurement": [fault.fault_fields(f) for f in faults]}
     if by_record:
         content["coefficients_by_record"] = list(by_record)
-    return {"diagnosis.json": as_json(content)} | picture_files(diagnosis, comparison.record.name)
+    return {"diagnosis.json": as_json(content)} | picture_files(diagnosis, all_names(comparison.record))
 
 
 def modes_before_and_after(diagnosis: Diagnosis) -> str:

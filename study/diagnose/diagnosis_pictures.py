@@ -55,7 +55,8 @@ def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
 def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
     """Figures by the stem of their file name; the caller applies the style sheet."""
     widest, (axes,) = page.empty_page(
-        f"What is missing from the model of {record}", f"verdict: {diagnosis.verdict.replace('_', ' ')}",
+        f"What is missing from the model: {diagnosis.verdict.replace('_', ' ')}",
+        f"{record}; the model as given misses {percent(diagnosis.comparison.prediction.error)} of the response",
         panel=3.4, legend_rows=0, headed=False, width=(1.4 if diagnosis.comparison.model.named else 1.0) * page.WIDTH,
     )  # fmt: skip
     widest.subplots_adjust(left=0.34)
@@ -87,8 +88,7 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
         axes.annotate(f"leaves {percent(row.response_error)}", (1.0, y), xycoords=("axes fraction", "data"),
                       xytext=(-3, 0), textcoords="offset points", ha="right", va="center", fontsize=8,
                       bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0})  # fmt: skip
-    before = diagnosis.comparison.prediction
-    axes.set_xlabel(f"explained share of the difference (%), which is {percent(before.error)} of the response")
+    axes.set_xlabel("share that it explains of what is missing (%)")
     return axes
 
 

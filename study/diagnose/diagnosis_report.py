@@ -1,13 +1,17 @@
 """The diagnosis as a table for people and as fields for files."""
 
+import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from tabulate import tabulate
 
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
+from study.equations.terms import LIBRARY
 from study.support.numbers import percent
+from study.support.statistics import Gain
 
 TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
@@ -16,26 +20,58 @@ SHOWN = 8  # candidates in the table on the screen
 def candidate_table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     head = ["", "effect", "where", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
-    rows = [head, *(_shown(i, row) for i, row in enumerate(diagnosis.candidates[:SHOWN], start=1))]
+    listed = shown_rows(diagnosis)
+    rows = [head, *(_shown(number, row) for number, row in listed)]
     if not diagnosis.comparison.model.named:  # there is one place
         rows = [row[:2] + row[3:] for row in rows]
     shown = tabulate(rows[1:], rows[0], tablefmt="simple", disable_numparse=True)
-    more, unfitted = len(diagnosis.candidates) - SHOWN, diagnosis.asked - len(diagnosis.candidates)
+    more, unfitted = len(diagnosis.candidates) - len(listed), diagnosis.asked - len(diagnosis.candidates)
     said = [f"... and {more} more, in diagnosis.json"] if more > 0 else []
+    said += [_why_this_order(diagnosis)] if _contradicts([row for _, row in listed]) else []
     said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to be fitted"] if unfitted else []
     return "\n".join([shown, "; ".join(said)]) if said else shown
+
+
+def _contradicts(rows: Sequence[Ranked]) -> bool:
+    """Whether a row stands behind one that explains less."""
+    return any(later.gain.explained > row.gain.explained for row, later in itertools.pairwise(rows))
+
+
+def _why_this_order(diagnosis: Diagnosis) -> str:
+    named = "what is named first, then " if diagnosis.answer is not None else ""
+    return f"in order of {named}what is left of both parts of the record; 'explains' is of the judged part alone"
+
+
+def shown_rows(diagnosis: Diagnosis) -> list[tuple[int, Ranked]]:
+    """The candidates that a table shows, each with its rank: the first, and all of the user's own."""
+    every = list(enumerate(diagnosis.candidates, start=1))
+    return every[:SHOWN] + [(number, row) for number, row in every[SHOWN:] if row.term.name not in LIBRARY]
 
 
 def _shown(number: int, row: Ranked) -> list[str]:
     ties = ", ".join(row.tied_with[:TIES])
     ties += f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else ""
-    # of what leaves twice as much as there was, how much more matters to nobody
-    share = "below -100 %" if row.gain.explained < -1.0 else percent(row.gain.explained, "z.1f", row.gain.error, ".1f")
+    share = explained_share(row.gain)
     return [
         str(number), row.term.name, row.entry.place.label, share, percent(row.response_error),
-        f"{row.effect.coefficient:.4g} +- {1.96 * row.effect.error:.2g} {row.effect.unit}", f"{row.p_value:.1g}",
+        shown_coefficient(row.effect.coefficient, 1.96 * row.effect.error, row.effect.unit), f"{row.p_value:.1g}",
         percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", ties,
     ]  # fmt: skip
+
+
+def explained_share(gain: Gain) -> str:
+    """What an effect explains with its standard error, where that reaches the digits shown."""
+    if gain.explained < -1.0:  # of what leaves twice as much as there was, how much more matters to nobody
+        return "below -100 %"
+    if gain.error < 5e-4:
+        return percent(gain.explained, "z.1f")
+    return percent(gain.explained, "z.1f", gain.error, ".1f")
+
+
+def shown_coefficient(value: float, half: float, unit: str) -> str:
+    """A coefficient with half of its 95 % interval; one of zero width is narrower than these digits."""
+    spread = f" +- {half:.2g}" if half > 0.0 else ""
+    return f"{value:.4g}{spread} {unit}"
 
 
 def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:

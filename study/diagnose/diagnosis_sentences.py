@@ -34,7 +34,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.answer is not None:
         said += [varying_in_words(one) for one in diagnosis.varying]
     if diagnosis.comparison.prediction.diverged:
-        said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
+        said.insert(0, "The free run of the model grows without bound: its error counts as 100 %.")
     return said
 
 
@@ -44,8 +44,8 @@ def _nothing(diagnosis: Diagnosis) -> str:
     asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
-        f"{percent(comparison.prediction.error)}, and what is left depends no more than chance has it on the motion"
-        f"{where}, its past or time, as noise does; none of {asked} explains any of it."
+        f"{percent(comparison.prediction.error)}, and what is left looks like noise: it depends neither on the motion"
+        f"{where}, nor on its past, nor on time. None of {asked} explains any of it."
     )
 
 
@@ -86,7 +86,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside it that is no noise.")
     if first.unphysical:
-        said.append(f"As fitted it is no physical effect: {first.unphysical}.")
+        said.append(f"As fitted it is not physical: {first.unphysical}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
@@ -110,11 +110,11 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
-        said.append(f"As fitted one of them is no physical effect: {answer.unphysical}.")
+        said.append(f"As fitted one of them is not physical: {answer.unphysical}.")
     if len(diagnosis.sets) > 1:
         count = len(diagnosis.sets)
         often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]
-        said.append(f"The record cannot tell {count} such sets apart; of these {count}, {enumerated(often)}.")
+        said.append(f"The record cannot tell {count} such sets apart. Of these, {enumerated(often)}.")
     return said
 
 
@@ -155,7 +155,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
             f"{percent(shares[0][1])} of what is unexplained, held out."
         )
     else:
-        said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
+        said.append("None of displacement, velocity, the past or time explains a tenth of it.")
     return said
 
 
@@ -171,7 +171,7 @@ def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
 def _amount(effect: FittedEffect) -> str:
     """Coefficient and shape parameters with their errors."""
     low, high = effect.interval
-    digits = _digits(effect.coefficient, high - low)
+    digits = digits_between(effect.coefficient, high - low)
     said = f"{effect.coefficient:.{digits}g} {effect.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
     parts = [
         f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
@@ -180,7 +180,7 @@ def _amount(effect: FittedEffect) -> str:
     return f"{said}, with {', '.join(parts)}" if parts else said
 
 
-def _digits(value: float, width: float) -> int:
+def digits_between(value: float, width: float) -> int:
     """Significant digits that tell the ends of an interval apart, four at least."""
     if value == 0.0 or not 0.0 < width < math.inf:
         return 4

@@ -23,7 +23,6 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
 
-OF_SIMPLE = 0.5  # of so many sets, as many more of simple effects alone
 BEAM = 200  # sets of a size from which those of the next are made
 COLLINEAR = 1e-10  # of the squared length of a column: what others leave of it is rounding
 
@@ -152,12 +151,12 @@ def _chosen(
     columns: Mapping[str, Floats], target: Floats, sizes: Sequence[int], most: int, offered: Mapping[str, ModelTerm],
     started: Callable[[frozenset[str]], SetStart],
 ) -> dict[int, list[SetStart]]:  # fmt: skip
-    """By size the sets that explain most, and of simple effects alone those that do: flexible ones imitate them all."""
+    """By size the sets that explain most, and half as many more of simple effects, which flexible ones imitate."""
     best = best_subsets(columns, target, sizes)
     simple = {name: column for name, column in columns.items() if unknowns_of(offered[name]) == 1}
     plain = best_subsets(simple, target, sizes) if 0 < len(simple) < len(columns) else {}
     return {
-        size: [started(n) for n in dict.fromkeys([*best[size][:most], *plain.get(size, [])[: int(OF_SIMPLE * most)]])]
+        size: [started(n) for n in dict.fromkeys([*best[size][:most], *plain.get(size, [])[: most // 2]])]
         for size in sizes
     }
 

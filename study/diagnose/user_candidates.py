@@ -1,10 +1,10 @@
 """Candidates that the user brings: formulas on the command line, each of which is tried or refused with a reason."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from study.diagnose.verdict import Diagnosis, search_base
 from study.equations.linear_part import connections
-from study.equations.model import Model, free
+from study.equations.model import Model, free, named_channels
 from study.equations.redundancy import repeated_force
 from study.equations.terms import LIBRARY, Term, custom
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
@@ -49,11 +49,14 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
             continue
         formula = term.components[0].shape
         try:
+            if term.parameters:  # of which nothing is known yet: what it needs of the record is asked for alone
+                named_channels(Model("own", (free(term),)), record.extra)
+                continue
             for item in reverse_inputs(Model("own", (free(LIBRARY["inertia"]), free(term)))):
                 if term.name in item.terms:
                     input_history(item, record)
         except StudyError as error:
-            raise StudyError(f"--candidate {term.name}={formula}: {error}") from None
+            raise StudyError(f"--candidate {term.heading}={formula}: {error}") from None
 
 
 def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:
@@ -67,3 +70,8 @@ def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:
         except StudyError as error:
             found[term.name] = str(error)
     return found
+
+
+def unfitted_in_words(untried: Mapping[str, str]) -> list[str]:
+    """The same, a sentence each."""
+    return [f"{effect} could not be fitted: {why}." for effect, why in untried.items()]

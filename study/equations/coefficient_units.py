@@ -37,5 +37,7 @@ def parameter_units(entry: ModelTerm, record: Record) -> dict[str, str]:
         powers = QUANTITIES[parameter.quantity]
         length = units_at(entry.place, record)[1]
         unit = dimensions.compose("", length, (-powers[0], -powers[1])).strip()
-        found[parameter.name] = "Hz" if parameter.quantity == "frequency" else f"1{unit}" if unit[0] == "/" else unit
+        found[parameter.name] = (
+            "Hz" if parameter.quantity == "frequency" else f"1{unit}" if unit.startswith("/") else unit
+        )
     return found

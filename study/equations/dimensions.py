@@ -9,6 +9,7 @@ from study.equations import formulas
 Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
 NONE: Dimensions = (Fraction(0), Fraction(0))
 MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration, the shape whose coefficient is a mass
+OF_NUMBERS = ("sin", "cos", "tan", "exp", "log", "tanh")  # functions of a number alone
 VARIABLES: dict[str, Dimensions] = {
     "u": (Fraction(1), Fraction(0)),
     "v": (Fraction(1), Fraction(-1)),
@@ -19,6 +20,17 @@ VARIABLES: dict[str, Dimensions] = {
 def dimensions(text: str, known: dict[str, Dimensions]) -> Dimensions | None:
     """Powers of length and time of a formula; None where its parts do not share them."""
     return _dimensions(formulas.parse(text), VARIABLES | known)
+
+
+def agrees(text: str, known: dict[str, Dimensions], *, angle: bool = False) -> bool:
+    """Whether a formula has a dimension, and every sine, exponential and the like in it is of a number.
+
+    Of any dimension at all where u may be an ``angle``.
+    """
+    calls = (node for node in ast.walk(formulas.parse(text)) if isinstance(node, ast.Call))
+    plain = (call for call in calls if isinstance(call.func, ast.Name) and call.func.id in OF_NUMBERS)
+    found = [_dimensions(call.args[0], VARIABLES | known) for call in plain]
+    return dimensions(text, known) is not None and all(d == NONE or (angle and d is not None) for d in found)
 
 
 def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | None:

@@ -26,6 +26,7 @@ class ModelTerm:
     coefficients: tuple[float | None, ...]  # one for each component, in the order of ``term.symbols``
     parameters: tuple[float | None, ...]  # one for each shape parameter
     place: Place = HERE
+    starts: tuple[tuple[str, float], ...] = ()  # where a fit of what is open begins, by key
 
     @property
     def name(self) -> str:
@@ -60,6 +61,11 @@ class ModelTerm:
         numbers = tuple(values.get(key, old) for key, old in self.values.items())
         split = len(self.coefficients)
         return replace(self, coefficients=numbers[:split], parameters=numbers[split:])
+
+    def opened(self, held: Collection[str] = ()) -> "ModelTerm":
+        """The same term with its values as starts of a fit, but those of ``held`` keys."""
+        starts = {**dict(self.starts), **{k: v for k, v in self.values.items() if v is not None and k not in held}}
+        return replace(self.with_values(dict.fromkeys(starts)), starts=tuple(starts.items()))
 
 
 def free(term: Term, place: Place = HERE) -> ModelTerm:
@@ -108,6 +114,11 @@ class Model:
         return own | (self.modal.values if self.modal else {})
 
     @property
+    def starts(self) -> dict[str, float]:
+        """Where a fit of what is open begins, by key, as far as the model says so."""
+        return {key: value for t in self.terms for key, value in t.starts if self.values[key] is None}
+
+    @property
     def roles(self) -> "Roles":
         """What the columns of a record may be for it: its forces, and motions of its coordinates."""
         from study.records.readers.roles import Roles
@@ -145,7 +156,7 @@ class Model:
     def numbers(self) -> dict[str, float]:
         """Every value; all must be known, and the mass of a single coordinate positive."""
         check_modes(self)
-        known = {key: value for key, value in self.values.items() if value is not None}
+        known = {key: value for key, value in (self.values | self.starts).items() if value is not None}
         missing = [key for key in self.values if key not in known]
         if missing:
             raise StudyError(f"model {self.name!r} gives no value for {', '.join(missing)}; a simulation needs all")
@@ -167,6 +178,7 @@ def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
             if name not in available:
                 known = ", ".join(sorted({*formulas.VARIABLES, *available}))
                 raise formulas.ExpressionError(
-                    f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi"
+                    f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi, and parameters behind "
+                    f"its name, as in '{entry.term.name}({name})', which are fitted"
                 )
     return model.channels

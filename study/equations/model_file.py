@@ -6,10 +6,12 @@ A file holds ``name`` and ``terms``; an entry of ``terms`` is a name, or a mappi
     terms:
       - inertia                                          # fitted
       - {term: linear_stiffness, value: 355.3}           # held
+      - {term: linear_damping, value: 3.8, held: false}  # fitted, and a fit begins there
       - {term: dead_band, u_g: 0.0025}                   # shape parameter given
       - {term: periodic_stiffness, f_m: 1.0, amplitude: 177.7, phase: 0.0}
       - {term: bracket, force: "u*abs(u) + 0.1*v**3"}    # the user's own
       - {term: linear_stiffness, varies_with: time}      # beside the entry whose coefficient changes (variation_entry)
+      - {term: friction(vs), force: "tanh(v/vs)"}        # the same, with a parameter that is fitted
 
 A structure has ``coordinates`` and ``forces`` as well, and each of its terms a place (``layout``).
 
@@ -28,6 +30,7 @@ from pathlib import Path
 from study.equations import layout, terms, variation_entry
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
+from study.equations.place import Place
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
 from study.support import yaml_text
@@ -90,7 +93,14 @@ def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
         place = layout.place_of_entry(mapping, mapping.get("term"), coordinates)
         plain = {key: value for key, value in mapping.items() if key not in layout.PLACES}
-        return replace(entry_from(plain), place=place)
+        return placed(entry_from(plain), place)
+
+
+def placed(entry: ModelTerm, place: Place) -> ModelTerm:
+    """An entry at a place, its starts included."""
+    moved = replace(entry, place=place)
+    keys = dict(zip(entry.keys, moved.keys, strict=True))
+    return replace(moved, starts=tuple((keys[key], value) for key, value in entry.starts))
 
 
 def format_model(model: Model) -> str:
@@ -102,14 +112,16 @@ def format_model(model: Model) -> str:
 
 def format_entry(entry: ModelTerm) -> str:
     """One entry of ``terms``, on one line; refuses values that are not finite."""
-    known = {key: value for key, value in entry.values.items() if value is not None}
+    held = {key: value for key, value in entry.values.items() if value is not None}
+    known = held | {key: value for key, value in entry.starts if key not in held}
     for key, value in known.items():
         if not math.isfinite(value):
             raise StudyError(f"{key} of {entry.name} is {value}; only finite numbers can be written")
     varied = entry.term.variation
     own_term = entry.term if varied is None else varied.of
-    fields = {"term": scalar(own_term.name)} | layout.place_fields(entry.place)
-    if own_term.name not in terms.LIBRARY:
+    own_formula = own_term.name not in terms.LIBRARY
+    fields = {"term": scalar(own_term.heading if own_formula else own_term.name)} | layout.place_fields(entry.place)
+    if own_formula:
         fields["force"] = json.dumps(own_term.components[0].shape)
     fields |= {} if varied is None else variation_entry.variation_fields(varied)
     parameters = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
@@ -122,6 +134,9 @@ def format_entry(entry: ModelTerm) -> str:
         fields["value"] = coefficients[entry.term.symbols[0]]
     elif coefficients:
         fields["values"] = _flow(coefficients)
+    if len(held) < len(known):
+        own = dict(zip(entry.keys, (*entry.term.symbols, *(p.name for p in entry.term.parameters)), strict=True))
+        fields["held"] = f"[{', '.join(own[key] for key in held)}]" if held else "false"
     return fields["term"] if len(fields) == 1 else _flow(fields)
 
 
@@ -204,15 +219,29 @@ def entry_from(item: Mapping[object, object]) -> ModelTerm:
         plain = {key: value for key, value in item.items() if key not in own}
         return variation_entry.entry_of(term, plain)
     amount = ("amplitude", "phase") if _phasor(term) else ("value",)
-    yaml_text.refuse_unknown(item, ("term", *own, *amount, "values", *(p.name for p in term.parameters)), name)
+    yaml_text.refuse_unknown(item, ("term", *own, *amount, "values", "held", *(p.name for p in term.parameters)), name)
     parameters = [yaml_text.number_of(item, p.name, name) for p in term.parameters]
     for parameter, value in zip(term.parameters, parameters, strict=True):
         if value is not None and value <= 0.0 and not parameter.signed:
             raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
     coefficients = _coefficients(term, item)
-    if name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
+    if term.name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
         raise StudyError(f"value of {name} is {coefficients[0]:g}; expected a mass above zero")
-    return ModelTerm(term, coefficients, tuple(parameters))
+    entry = ModelTerm(term, coefficients, tuple(parameters))
+    return entry if "held" not in item else entry.opened(_held(entry, item["held"]))
+
+
+def _held(entry: ModelTerm, said: object) -> tuple[str, ...]:
+    """The keys of an entry that a fit holds: all or none, or those that are listed."""
+    own = dict(zip((*entry.term.symbols, *(p.name for p in entry.term.parameters)), entry.keys, strict=True))
+    given = [name for name, key in own.items() if entry.values[key] is not None]
+    if isinstance(said, bool):
+        return tuple(entry.keys) if said else ()
+    listed = as_list(said)
+    if listed is None or not all(name in given for name in listed):
+        wanted = f"false, or a list of {', '.join(given)}" if given else "no 'held' where no value is given"
+        raise StudyError(f"held of {entry.term.name} is {shown(said)}; expected {wanted}")
+    return tuple(own[name] for name in given if name in listed)
 
 
 def _phasor(term: Term) -> bool:

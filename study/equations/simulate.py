@@ -84,7 +84,7 @@ def simulate(
     forces, integrator = force if isinstance(force, Mapping) else {"force": force}, integrator or Integrator()
     channels, extra = {**forces, **(extra or {})}, extra or {}
     wanted = [Sensor(c, m) for m in MOTIONS for c in model.coordinates] if sensors is None else list(sensors)
-    model.numbers()
+    model = model.with_values(model.numbers())
     named_channels(model, extra)
     heavy = any(entry.term.name == "inertia" for entry in model.terms)
     expect(heavy or model.modal, f"model {model.name!r} has no inertia; a simulation needs it")

@@ -25,7 +25,7 @@ class Component:
 Places = Literal[
     "quantiles of |u|", "quantiles of u", "times of the motion", "per amplitude", "shares of the one before",
     "shares of the velocity", "lines of the modulation", "lines of the residual", "pitches of the residual",
-    "quantiles of what it varies with",
+    "quantiles of what it varies with", "numbers",
 ]  # fmt: skip
 
 
@@ -36,7 +36,7 @@ class Search:
     ``kind`` says what the places are: quantiles of a displacement; multiples of the time in which the motion turns by
     one radian, of one over its rms displacement, of its rms velocity, or of the parameter before; or distances, in
     lines of a spectrum, from where a stiffness that varies with time would explain most, or from the peaks of the
-    residual over time or over the displacement.
+    residual over time or over the displacement. Of a plain number they are its values.
     """
 
     kind: Places
@@ -49,7 +49,9 @@ class ShapeParameter:
     """A shape parameter, given or estimated."""
 
     name: str  # in formulas
-    quantity: str  # its unit: ``length``, ``frequency``, ``time``, ``velocity``, ``1/length`` or that of a channel
+    quantity: (
+        str  # its unit: ``length``, ``frequency``, ``time``, ``velocity``, ``1/length``, ``number``, or a channel's
+    )
     meaning: str  # to people
     search: Search  # where a fit looks for it
     # Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the parameter
@@ -107,6 +109,11 @@ class Term:
     @property
     def symbols(self) -> tuple[str, ...]:
         return tuple(c.symbol for c in self.components)
+
+    @property
+    def heading(self) -> str:
+        """Name as a user gives it with a formula: ``friction(vs)`` where that has a parameter ``vs``."""
+        return f"{self.name}({', '.join(p.name for p in self.parameters)})" if self.parameters else self.name
 
     @property
     def effort(self) -> int:
@@ -189,5 +196,6 @@ QUANTITIES = {
     "velocity": dimensions.VARIABLES["v"],
     "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
     OF_VARIATION: dimensions.NONE,
+    "number": dimensions.NONE,
 }
 STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements

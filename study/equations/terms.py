@@ -9,16 +9,17 @@ its shape parameters are searched, how a trial draws it and when it is physical:
 To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised tests.
 """
 
-from collections.abc import Collection, Container, Iterable
+from collections.abc import Collection, Container, Iterable, Mapping
 from difflib import get_close_matches
 
 import numpy as np
 
 from study.equations import formulas, kernels
 from study.equations.graph import Graph, Program
+from study.equations.own_parameters import name_and_parameters, parameters_of
 from study.equations.term import QUANTITIES as QUANTITIES
 from study.equations.term import Component, PhysicalBound, Search, ShapeParameter, Term
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 
 def _single(
@@ -287,12 +288,14 @@ def find_terms(word: str) -> tuple[Term, ...]:
     return found
 
 
-def custom(name: str, force: str) -> Term:
+def custom(heading: str, force: str) -> Term:
     """A user's own term: ``force`` is a formula of u, v, t and the names of extra measured channels.
 
-    u, v, t and pi are displacement, velocity, time and the number, even where a channel is called so. The term has no
-    state: z is a channel like any other.
+    Its parameters, which are fitted, are named behind its name: ``friction(vs)`` with ``tanh(v/vs)``. u, v, t and
+    pi are displacement, velocity, time and the number, even where a channel is called so. The term has no state: z is a
+    channel like any other.
     """
+    name, listed = name_and_parameters(heading)
     if name in LIBRARY:
         raise StudyError(f"the name {name!r} belongs to the library; give your own term another name")
     if not name.isidentifier() or not name.isascii():
@@ -300,7 +303,23 @@ def custom(name: str, force: str) -> Term:
     graph = Graph()
     known = {n: graph.input(n) for n in formulas.names(force)}
     formulas.add_formula(graph, force, known)  # raises unless it is a formula
-    return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")
+    for parameter in (p for p in listed if p in known and p not in formulas.VARIABLES):
+        scales = f"{parameter!r} only scales the formula {force!r}, which the coefficient of {name} does already"
+        expect(not _only_scales(graph, force, known, parameter), f"{scales}; expected the formula without it")
+    parameters = parameters_of(listed, force) if listed else ()
+    return _single(
+        name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows",
+        parameters=parameters,
+    )  # fmt: skip
+
+
+def _only_scales(graph: Graph, force: str, known: Mapping[str, int], parameter: str) -> bool:
+    """Whether a parameter is a factor before the rest of a formula, or a divisor of it."""
+    program = graph.program([formulas.add_formula(graph, force, known)])
+    motions = [{"u": 0.7, "v": 0.4, "t": 0.2}, {"u": -1.3, "v": 0.6, "t": 1.1}, {"u": 0.2, "v": -1.1, "t": 2.3}]
+    forces = [[_value(program, {**motion, parameter: value}) for value in (0.31, 0.62)] for motion in motions]
+    ratios = [two / one for one, two in forces if one != 0.0]
+    return len(ratios) > 1 and max(ratios) - min(ratios) < 1e-9 * max(map(abs, ratios))
 
 
 def same_elsewhere(one: str, other: str, beside: Collection[str]) -> bool:

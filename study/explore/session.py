@@ -23,7 +23,6 @@ from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
-from study.equations import formulas
 from study.equations.model import Model, free
 from study.equations.terms import Term, custom, is_own
 from study.explore.by_record import ByRecord, Several, by_record
@@ -283,10 +282,11 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
         name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
         formula = text
     term = custom(name.strip(), formula.strip())
-    known = ("u", "v", "t", *channels)
-    for used in formulas.names(formula.strip()):
+    known = ", ".join(("u", "v", "t", *channels))
+    for used in term.channels:
         uses = f"the expression {formula.strip()!r} uses the name {used!r}"
-        expect(used in known, f"{uses}; it may use {', '.join(known)}")
+        like = f"parameters to be fitted that are named before it, as in '{term.name}({used})={formula.strip()}'"
+        expect(used in channels, f"{uses}; it may use {known}, and {like}")
     expect(term.name not in taken, f"the name {term.name!r} is taken; expected another")
     return term
 

@@ -194,7 +194,7 @@ def _detail(row: Ranked) -> str:
     elif 0.0 < row.distance < math.inf:
         said += f" That leaves more than the first by {number(row.distance, 2)} standard errors."
     who = "it" if len(effects) == 1 else "one of them"
-    return said + (f" As fitted {who} is no physical effect: {escape(row.unphysical)}." if row.unphysical else "")
+    return said + (f" As fitted {who} is not physical: {escape(row.unphysical)}." if row.unphysical else "")
 
 
 def _label(row: Ranked) -> str:

@@ -149,9 +149,9 @@ def _is_unit(unit: str) -> bool:
 
 
 def _base(unit: str) -> dict[str, str]:
-    """The same in kilograms, metres and seconds."""
+    """The same in kilograms, metres, seconds and amperes."""
     found = parse_unit(unit)
-    force, length, time, _ = found.powers
-    powers = {"kg": force, "m": force + length, "s": time - 2 * force}
+    force, length, time, _, current = found.powers
+    powers = {"kg": force, "m": force + length, "s": time - 2 * force, "A": current}
     fields = {name: str(power) for name, power in powers.items() if power}
     return fields if found.factor == 1.0 else {**fields, "factor": repr(found.factor)}

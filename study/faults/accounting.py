@@ -40,7 +40,7 @@ from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
 NOT_ASKED_OF_MODES = "faults of the measurement are not looked for beside 'linear: modal'"
-NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
+NOT_ASKED = "faults of the measurement were not looked for: that takes one unbroken stretch of a driven record"
 
 
 @dataclass(frozen=True, eq=False)

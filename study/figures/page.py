@@ -22,7 +22,11 @@ from study.support.files import replace_file
 
 LEFT, BOTTOM, TITLE, GAP = 0.88, 0.55, 0.58, 0.34  # inches
 WIDTH = 6.4
-METADATA = {"svg": {"Date": None}, "png": {"Software": None}}  # neither the hour nor the version: same bytes
+METADATA = {
+    "svg": {"Date": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+}  # neither the hour nor the version: same bytes
 
 
 def width(columns: int) -> float:
@@ -123,7 +127,7 @@ def write_each(kinds: Mapping[str, Callable[[], Figure]], outputs: Mapping[str, 
 
 
 def rendered(figure: Figure, kind: str) -> bytes:
-    """A figure as the bytes of a file, the same bytes each time; ``kind`` is ``png`` or ``svg``."""
+    """A figure as the bytes of a file, the same bytes each time; ``kind`` is ``png``, ``svg`` or ``pdf``."""
     target = BytesIO()
     figure.savefig(target, format=kind, metadata=METADATA[kind])
     return target.getvalue()

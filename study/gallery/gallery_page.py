@@ -37,7 +37,7 @@ KEPT = (
     "climb/step_0/structure.png",
     "climb/response.png",
     "climb/step_0/constancy.png",
-)  # the first two of these that there are stand in the documentation
+)  # the first of these that there is stands in the documentation
 MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
 Fields = dict[str, Any]
 
@@ -190,16 +190,30 @@ def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -
 
 def told(entry: Entry) -> list[Block]:
     """What stands in the literature, what each of the records shows, and published values beside those found."""
-    known = entry.known
-    blocks: list[Block] = [
-        document.Text(f"{known.test}. {known.source}"),
-        document.Text(f"**In the literature.** {known.known}"),
-    ]
+    blocks = of_literature(entry)
     for one in entry.found:
         blocks += of_record(one, named=len(entry.found) > 1)
-    if entry.values:
-        blocks += [document.Text("**Published values beside those found.**"), beside_each_other(entry.values)]
-    return blocks
+    return blocks + published_and_found(entry)
+
+
+def of_literature(entry: Entry) -> list[Block]:
+    """What was done to the structure, and what is known of it."""
+    known = entry.known
+    return [document.Text(f"{known.test}. {known.source}"), document.Text(f"**In the literature.** {known.known}")]
+
+
+def published_and_found(entry: Entry) -> list[Block]:
+    """Published values beside those found, if there are any."""
+    if not entry.values:
+        return []
+    return [document.Text("**Published values beside those found.**"), beside_each_other(entry.values)]
+
+
+def in_short(found: RecordFindings, named: bool) -> Block:
+    """From where the climb of a record begins to what it leaves, in a paragraph."""
+    begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
+    name = f"**`{found.record}`.** " if named else ""
+    return document.Text(f"{name}The model is given as {begins}. **What is left at the end.** {left(found)}")
 
 
 def of_record(found: RecordFindings, named: bool) -> list[Block]:
@@ -232,21 +246,21 @@ def left(found: RecordFindings) -> str:
         return f"{size} (noise floor {floor}): more than the response itself, so the model predicts none of it."
     if last["verdict"] == NOTHING:
         return (
-            f"{size} (noise floor {floor}), which depends no more than chance has it on the motion or its past: noise, "
-            "as far as this record can say."
+            f"{size} (noise floor {floor}). It depends neither on the motion nor on its past: noise, as far as this "
+            "record shows."
         )
     if last["verdict"] == MISSING:
         first = last["candidates"][0]
         tied = [_effect(t) for t in first.get("tied_with", ())]
         also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
         return (
-            f"{size} (noise floor {floor}): no noise. The diagnosis still names {_effect(first)}{also} and with it "
+            f"{size} (noise floor {floor}). The diagnosis still names {_effect(first)}{also} and with it "
             f"{percent(first['response_error'])} would be left; the climb ends here."
         )
     depends = percent(last["left"]) if last.get("left") else "much"
     return (
-        f"{size} (noise floor {floor}): no noise, but nothing with a name either. General functions of the motion "
-        f"explain a part of it, {depends} of the response; no single candidate does."
+        f"{size} (noise floor {floor}). General functions of the motion explain a part of it, {depends} of the "
+        "response; no single candidate does."
     )
 
 
@@ -273,7 +287,7 @@ def beside_each_other(values: Sequence[Beside]) -> Block:
         (f"`{v.published.record}`, {v.published.quantity}", _number(v.published.value, v.published.unit),
          "not in the model" if v.found is None else _number(v.found, v.published.unit),
          "" if v.interval is None else f"{v.interval[0]:.4g} to {v.interval[1]:.4g}",
-         "" if v.found is None else f"{v.found / v.published.value - 1.0:+.1%}".replace("%", " %"), v.published.within)
+         "" if v.found is None else f"{v.found / v.published.value - 1.0:+z.1%}".replace("%", " %"), v.published.within)
         for v in values
     ]  # fmt: skip
     return document.table(("", "published", "found", "95 % interval", "differs by", "to be expected"), rows)
@@ -308,12 +322,12 @@ def gallery_page(shown: Sequence[Entry]) -> bytes:
 def climb_overview(shown: Sequence[Entry]) -> Block:
     """One line a record: where the climb begins, what it adds, and where it ends."""
     rows = [
-        (f"`{f.record}`", e.known.test, percent(f.steps[0]["error"]["response"]), _added(f),
+        (f"`{f.record}`", percent(f.steps[0]["error"]["response"]), _added(f),
          percent(f.steps[-1]["error"]["response"]), percent(f.steps[-1]["noise_floor"]["response"]),
          f.last["verdict"].replace("_", " "))
         for e in shown for f in e.found
     ]  # fmt: skip
-    head = ("record", "test", "error as given", "added", "error at the end", "noise floor", "last verdict")
+    head = ("record", "error as given", "added", "error at the end", "noise floor", "last verdict")
     return document.table(head, rows)
 
 
@@ -343,7 +357,7 @@ def climb_pictures(found: RecordFindings) -> list[Picture]:
 
 def kept(found: RecordFindings) -> list[str]:
     """Names of the pictures that the documentation keeps of a record."""
-    return [name for name in KEPT if (found.folder / name).is_file()][:2]
+    return [name for name in KEPT if (found.folder / name).is_file()][:1]
 
 
 def picture_name(found: RecordFindings, name: str) -> str:
@@ -356,7 +370,8 @@ def documented(shown: Sequence[Entry], folder: str) -> list[Block]:
     parts: list[Block] = [climb_overview(shown)]
     for entry in shown:
         parts.append(Heading(entry.known.title))
-        parts += told(entry)
+        parts += [*of_literature(entry), *(in_short(one, len(entry.found) > 1) for one in entry.found)]
+        parts += published_and_found(entry)
         first = entry.found[0]
         parts += [Image(PICTURES[name], f"{folder}/{picture_name(first, name)}") for name in kept(first)]
     return parts

@@ -4,7 +4,7 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -132,6 +132,7 @@ def read(
     *,
     columns: Mapping[str, str | int] | None = None,
     units: Mapping[str, str] | None = None,
+    scale: Mapping[str, float] | None = None,
     fs: float | None = None,
     dt: float | None = None,
     group: str | None = None,
@@ -153,6 +154,9 @@ def read(
         or its number counted from 1.
     units : mapping of str, optional
         Role to unit: ``{"force": "kN"}``.
+    scale : mapping of float, optional
+        Role to a factor on the numbers of its column, whose unit is then that of the product: ``{"force": -1}`` where
+        the force has the wrong sign, ``{"force": 31.0}`` beside ``units={"force": "N"}`` for the current of a motor.
     fs, dt : float, optional
         Sampling rate in hertz, or interval in seconds, if there is no column of times.
     group : str, optional
@@ -182,7 +186,7 @@ def read(
 
     options = ReadOptions(
         dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped,
-        free=free,
+        free=free, scale=dict(scale or {}),
     )  # fmt: skip
     found = (
         read_record(Path(path), options) if model is None else read_record(Path(path), options, model.equation.roles)
@@ -195,6 +199,7 @@ def record(
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    scale: Mapping[str, float] | None = None,
     fs: float | None = None,
     dt: float | None = None,
     name: str = "record",
@@ -210,7 +215,7 @@ def record(
     ----------
     channels : mapping of arrays of shape (n,), or DataFrame
         Named as :func:`read` would find them in a file (``force``, ``displacement``, ...), or as ``columns`` says.
-    columns, units, fs, dt, period, accept_saturated, accept_swapped, free, model
+    columns, units, scale, fs, dt, period, accept_saturated, accept_swapped, free, model
         As for :func:`read`.
     name : str
         What it is called in tables.
@@ -223,8 +228,9 @@ def record(
     from study.records.readers import ReadOptions
 
     options = ReadOptions(
-        dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped, free=free
-    )
+        dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped,
+        free=free, scale=dict(scale or {}),
+    )  # fmt: skip
     arrays = {str(key): values for key, values in channels.items()}
     return Record.of(_from_arrays(arrays, name, options, model))
 
@@ -243,4 +249,5 @@ def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions", m
             )
         title, unit = split_unit(heading)
         columns.append(Column(title, array.astype(np.float64), unit))
-    return not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, roles), options)
+    made = not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, roles), options)
+    return replace(made, name=name) if name == "record" else made  # a file of this name is called after its folder

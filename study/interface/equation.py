@@ -54,7 +54,7 @@ def term(
         out.
     **values : float
         ``value`` of its coefficient (``amplitude`` and ``phase`` of a periodic one) and shape parameters by name, in
-        the units of the record. What is left out is fitted.
+        the units of the record. What is left out is fitted. ``held=False`` makes them the start of a fit.
 
     Raises
     ------
@@ -100,11 +100,12 @@ class Term(ModelTerm):
     @classmethod
     def of(cls, entry: ModelTerm) -> "Term":
         """An entry of the packages below as one of this interface."""
-        return cls(entry.term, entry.coefficients, entry.parameters, entry.place)
+        return cls(entry.term, entry.coefficients, entry.parameters, entry.place, entry.starts)
 
     def __repr__(self) -> str:
         """One line: name, formula and what is held."""
         known = [f"{key} = {value:g}" for key, value in self.values.items() if value is not None]
+        known += [f"{key} from {value:g} on" for key, value in self.starts]
         return f"<Term {'; '.join([f'{self.name}: {self.term.formula}', *known])}>"
 
 
@@ -166,7 +167,7 @@ class Model:
         entries = tuple(term(t) if isinstance(t, str) else t for t in terms)
         expect(entries or modal, "a model needs terms; expected some such as Model('inertia', 'linear_stiffness')")
         made = equations.Model(
-            name, tuple(ModelTerm(e.term, e.coefficients, e.parameters, e.place) for e in entries),
+            name, tuple(ModelTerm(e.term, e.coefficients, e.parameters, e.place, e.starts) for e in entries),
         )  # fmt: skip
         if coordinates:
             made = replace(made, coordinates=tuple(coordinates), forces=tuple((forces or {}).items()))
@@ -201,7 +202,7 @@ class Model:
     def save(self, path: str | Path, *, values: bool = True) -> None:
         """Write a model file, with the values that are known or (``values=False``) without any.
 
-        A fit of the file holds the values that it gives: save without them to fit anew.
+        What was fitted is written as the start of another fit, what was held is held again.
 
         Raises
         ------
@@ -246,23 +247,25 @@ class Model:
 
     @property
     def values(self) -> dict[str, float | None]:
-        """Coefficients and shape parameters by key; None where nothing is given."""
-        return self.equation.values
+        """Coefficients and shape parameters by key, held or the start of a fit; None where nothing is given."""
+        return self.equation.values | self.equation.starts
 
     def hold(self, values: Mapping[str, float] | None = None, **more: float) -> "Model":
         """The model with values given, by key (``k3``, or ``dead_band.u_g`` in a mapping), which a fit then holds.
+
+        Without any, all that it has starts for.
 
         Raises
         ------
         StudyError
             If it has no such value.
         """
-        given = {**(values or {}), **more}
+        given = {**(values or {}), **more} or self.equation.starts
         self._check(tuple(given))
         return Model.of(self.equation.with_values(given))
 
     def free(self, *keys: str) -> "Model":
-        """The model with these values left open, or all of them.
+        """The model with these values left open, starts included, or all of them.
 
         Raises
         ------
@@ -270,7 +273,10 @@ class Model:
             If it has no such value.
         """
         self._check(keys)
-        return Model.of(self.equation.with_values(dict.fromkeys(keys or self.values)))
+        gone = keys or tuple(self.values)
+        opened = self.equation.with_values(dict.fromkeys(gone))
+        kept = (replace(t, starts=tuple((k, v) for k, v in t.starts if k not in gone)) for t in opened.terms)
+        return Model.of(replace(opened, terms=tuple(kept)))
 
     def _check(self, keys: tuple[str, ...]) -> None:
         for key in keys:
@@ -313,7 +319,8 @@ class Model:
     def fit(
         self, record: "Record | Sequence[Record]", *, fit: Samples | None = None,
         judge: 'Samples | Literal["every-other-block"] | None' = None, use: Sequence[Times] = (),
-        response: str | None = None, cutoff: float | None = None, estimator: str = "output_error",
+        response: str | None = None, cutoff: float | None = None, near: float | None = None,
+        up_to: float | None = None, estimator: str = "output_error",
         measurement: "Given | bool | None" = None, as_sampled: bool = False,
         absolute: bool = False, each_record: Sequence[str] = (), horizon: float | None = None,
     ) -> "Fit":  # fmt: skip
@@ -339,6 +346,11 @@ class Model:
             The measured motion that free runs are held against; the first of displacement, velocity, acceleration.
         cutoff : float, optional
             Integrate measured accelerations above this frequency in hertz and judge nothing below.
+        near : float, optional
+            Of a record that shows several modes the frequency in hertz of the one that is meant: the fit of a single
+            mass begins there.
+        up_to : float, optional
+            Use what lies below this frequency in hertz alone, where a record shows modes that the model does not have.
         estimator : str
             What finds the coefficients: the fit in free run, or one of :func:`identify`.
         measurement : mapping, or False
@@ -363,7 +375,8 @@ class Model:
         from study.interface.fitted import fitted
 
         return fitted(
-            self, record, fit=fit, judge=judge, use=use, response=response, cutoff=cutoff, estimator=estimator,
+            self, record, fit=fit, judge=judge, use=use, response=response, cutoff=cutoff, near=near, up_to=up_to,
+            estimator=estimator,
             measurement=measurement, as_sampled=as_sampled, absolute=absolute, each_record=each_record,
             horizon=horizon,
         )  # fmt: skip
@@ -372,7 +385,8 @@ class Model:
         """One line: name, terms and what is held."""
         shown: list[str] = []
         for entry in self.equation.terms:
-            known = ", ".join(f"{k} = {v:g}" for k, v in entry.values.items() if v is not None)
+            values = [f"{k} = {v:g}" for k, v in entry.values.items() if v is not None]
+            known = ", ".join([*values, *(f"{k} from {v:g} on" for k, v in entry.starts)])
             shown.append(f"{entry.name} ({known})" if known else entry.name)
         return f"<Model {self.name}: {', '.join(shown)}>"
 

@@ -79,8 +79,10 @@ class Fit(FitPictures):
 
     @property
     def model(self) -> Model:
-        """The model with its fitted values."""
-        return Model.of(self.comparison.fit.model)
+        """The model with its fitted values, from which a fit to another record begins; what was held is held."""
+        fitted, held = self.comparison.fit.model, self.comparison.fit.held
+        entries = fitted.terms if fitted.modal else tuple(t.opened(held) for t in fitted.terms)
+        return Model.of(replace(fitted, terms=entries))
 
     @property
     def given(self) -> Model:
@@ -353,19 +355,22 @@ class Fit(FitPictures):
 def fitted(
     model: Model, record: Record | Sequence[Record], *, fit: Samples | None,
     judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
-    cutoff: float | None, estimator: str, measurement: Given | bool | None, as_sampled: bool,
+    cutoff: float | None, near: float | None, up_to: float | None, estimator: str,
+    measurement: Given | bool | None, as_sampled: bool,
     absolute: bool, each_record: Sequence[str], horizon: float | None,
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
     records, separate = records_of(record), tuple[Separate, ...]()
     settings = settings_asked(records[0].source, measurement)
     expect(cutoff is None or 0.0 < cutoff < math.inf, f"cutoff is {cutoff!r}; expected a frequency above 0 Hz")
+    for name, given in (("near", near), ("up_to", up_to)):
+        expect(given is None or 0.0 < given < math.inf, f"{name} is {given!r}; expected a frequency above 0 Hz")
     expect(horizon is None or 0.0 < horizon < math.inf, f"horizon is {horizon!r}; expected a time above 0 s")
     alternate = judge == "every-other-block"
     layout = Layout(
         tuple(_stretch(pair) for pair in use), _samples("fit", fit, records[0]),
-        None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, as_sampled,
-        horizon,
+        None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, near, up_to,
+        as_sampled, horizon,
     )  # fmt: skip
     equation, asked = model.equation, list[measured.Record](distinct(records))
     if each_record:

@@ -1,14 +1,14 @@
 """Which effect is missing: the diagnosis of a fit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from study.diagnose import confirmed_faults, diagnosis_report
 from study.diagnose import verdict as verdicts
 from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.ranked import FittedEffect, Ranked
-from study.diagnose.user_candidates import check_on
+from study.diagnose.user_candidates import check_on, own_candidates, unfitted, unfitted_in_words
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
@@ -94,7 +94,8 @@ class Candidate:
 
     def __repr__(self) -> str:
         """One line: name, what it explains, coefficient."""
-        amounts = ", ".join(f"{e.coefficient:.4g} +- {1.96 * e.error:.2g} {e.unit}" for e in self.ranked.effects)
+        effects = self.ranked.effects
+        amounts = ", ".join(diagnosis_report.shown_coefficient(e.coefficient, 1.96 * e.error, e.unit) for e in effects)
         return f"<Candidate {self.name}: explains {percent(self.explained, '.3g')}, {amounts}>"
 
 
@@ -110,11 +111,14 @@ class Diagnosis:
         Faults of the measurement that the record shows beside the missing effect.
     says : str
         What to tell the engineer, in sentences, with the test that would tell tied candidates apart.
+    not_fitted : mapping of str
+        Your own candidates that could not be fitted, and why.
     """
 
     result: verdicts.Diagnosis
     faults: tuple[Fault, ...]
     says: Words
+    not_fitted: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def verdict(self) -> str:
@@ -213,9 +217,10 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         rows = [
-            [str(place), c.name, f"{percent(c.explained, 'z.1f')}", percent(c.error),
-             f"{c.coefficient:.4g} ± {1.96 * c.ranked.effect.error:.2g} {c.unit}", f"{c.p_value:.1g}"]
-            for place, c in enumerate(self.candidates[: diagnosis_report.SHOWN], start=1)
+            [str(place), c.name, diagnosis_report.explained_share(c.ranked.gain), percent(c.error),
+             diagnosis_report.shown_coefficient(c.coefficient, 1.96 * c.ranked.effect.error, c.unit),
+             f"{c.p_value:.1g}"]
+            for place, c in ((n, Candidate(row)) for n, row in diagnosis_report.shown_rows(self.result))
         ]  # fmt: skip
         heads = ["", "effect", "explains", "error with it", "coefficient", "p"]
         return html_table(f"Verdict: {self.verdict.replace('_', ' ')}", heads, rows, self.says)
@@ -225,8 +230,10 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
     """What :meth:`Fit.diagnose` does; its arguments."""
     for name in without:
         terms.get(name)
-    extra = [terms.custom(name, formula) for name, formula in own.items()]
+    extra = own_candidates([f"{name}={formula}" for name, formula in own.items()], fit.comparison.model)
     check_on(fit.comparison.record, extra)
     asked = replace(fit.asked, comparison=fit.comparison)
     found = confirmed_faults.diagnose_accounted(asked, extra=extra, without=tuple(without))
-    return Diagnosis(found.diagnosis, found.faults, Words(diagnosis_in_words(found.diagnosis)))
+    untried = unfitted(found.diagnosis, extra)
+    says = [diagnosis_in_words(found.diagnosis), *unfitted_in_words(untried)]
+    return Diagnosis(found.diagnosis, found.faults, Words(" ".join(says)), untried)

@@ -222,7 +222,7 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
         first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
         units |= forces
         for name, u in forces.items():
-            wanted[name] = u.text if u.powers.voltage else f"{first} {length}" if u.powers.length else first
+            wanted[name] = u.text if u.powers.uncalibrated else f"{first} {length}" if u.powers.length else first
     channels: dict[str, Floats] = {}
     notes: list[str] = []
     for channel, unit in units.items():

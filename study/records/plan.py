@@ -9,10 +9,10 @@ from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
+from study.support.thresholds import ENOUGH
 
 Span = tuple[int, int]
 FEWEST = 64  # samples in a part
-QUIET = 0.1  # of the rms motion of the other part
 MOST = 0.5  # of a part: channels that rest for longer do not move in it
 
 
@@ -121,9 +121,10 @@ def driven_apart(record: Record, one: Span, other: Span) -> bool:
 
 
 def falls_silent(record: Record, sensors: Sequence[Sensor], one: Span, other: Span) -> bool:
-    """Whether the motion in one of two parts is so small that noise is much of what a sensor shows there."""
-    sizes = [np.std(record.columns(sensors, span), axis=0) for span in (one, other)]
-    return bool(np.any(np.minimum(*sizes) < QUIET * np.maximum(*sizes)))
+    """Whether one of two parts has nearly all the power of every motion: noise is much of what the other shows."""
+    first, second = (np.var(record.columns(sensors, span), axis=0) for span in (one, other))
+    little = 1.0 - ENOUGH
+    return bool(np.all(first < little * second) or np.all(second < little * first))
 
 
 def shared(record: Record, one: Span, other: Span) -> float:

@@ -28,6 +28,7 @@ class Prepared:
     edge: int  # samples at each end that derivatives and integrals leave uncertain
     notes: tuple[str, ...] = ()  # what was converted or computed, a sentence each
     low: float = 0.0  # frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0
+    near: float = 0.0  # frequency in hertz near which the user knows the mode that is meant, or 0
     # Samples that say nothing, as clipped ones do, and are neither fitted nor judged: (n, s), or (n,) of all sensors.
     lost: Bools | None = None
     every: int = 1  # how many samples there were to one of this (:mod:`study.records.sampling_rate`)

@@ -67,6 +67,7 @@ class Record:
     between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.READINGS``
     coordinates: tuple[str, ...] = (ALONE,)  # whose motions its channels may be
     forces: tuple[str, ...] = ("force",)  # which channels are forces
+    remarks: tuple[str, ...] = ()  # what its reader noticed, a sentence each: units that nobody gave, rest, junk
     computed: frozenset[str] = frozenset()  # motions that were not measured but computed from those that were
 
     def __len__(self) -> int:

@@ -23,6 +23,7 @@ from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
+from study.support.errors import expect
 from study.support.thresholds import ALPHA
 
 ORDER = 3  # products of the motion up to this order do not fold into its band: those of most library terms' forces
@@ -187,6 +188,27 @@ def decimated(record: Record, factor: int) -> Record:
         channels[name] = np.asarray(low[reach : reach + len(values)][::factor] + mean)
     period = None if record.period is None else record.period // factor
     return replace(record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED)
+
+
+def low_passed(record: Record, highest: float) -> tuple[Record, str]:
+    """A record without what lies above a frequency in hertz, and a sentence on that.
+
+    Forces and motions go through one filter, which a linear equation does not see; what a nonlinear one makes above the
+    limit is lost.
+
+    Raises
+    ------
+    StudyError
+        If it is sampled too coarsely for the filter.
+    """
+    nyquist = 0.5 / record.dt
+    factor = int(nyquist * PASSED / highest)
+    most = 0.5 * nyquist * PASSED
+    expect(
+        factor > 1, f"{record.name}: what lies above {highest:g} Hz is to be left out; expected {most:.3g} Hz or less"
+    )
+    said = f"what lies above {highest:g} Hz is left out of force and motion, which begins to fade at that frequency"
+    return decimated(record, factor), said
 
 
 def _goes_round(values: Floats) -> bool:

@@ -1,6 +1,6 @@
 """Units as people write them: ``m/s²``, ``mm s^-2``, ``kN``, ``g``, ``mV``.
 
-Force, length, time and voltage are the base dimensions; a mass is a force over an acceleration, so that
+Force, length, time, voltage and current are the base dimensions; a mass is a force over an acceleration, so that
 ``kg m/s^2`` is a force.
 """
 
@@ -20,6 +20,12 @@ class Powers(NamedTuple):
     length: int = 0
     time: int = 0
     voltage: int = 0
+    current: int = 0
+
+    @property
+    def uncalibrated(self) -> bool:
+        """Whether it is of a signal that stands for another quantity: volts of a sensor, amperes of a motor."""
+        return self.voltage == 1 or self.current == 1
 
 
 FORCE, LENGTH, TIME, VOLTAGE = Powers(force=1), Powers(length=1), Powers(time=1), Powers(voltage=1)
@@ -32,21 +38,21 @@ BASES: dict[str, tuple[float, Powers]] = {
     "kgf": (STANDARD_GRAVITY, FORCE), "dyn": (1e-5, FORCE), "kg": (1.0, Powers(1, -1, 2)),
     "m": (1.0, LENGTH), "in": (0.0254, LENGTH), "inch": (0.0254, LENGTH), "mil": (0.0254e-3, LENGTH),
     "ft": (0.3048, LENGTH), "s": (1.0, TIME), "sec": (1.0, TIME), "min": (60.0, TIME), "h": (3600.0, TIME),
-    "V": (1.0, VOLTAGE), "Gal": (0.01, ACCELERATION),
+    "V": (1.0, VOLTAGE), "A": (1.0, Powers(current=1)), "Gal": (0.01, ACCELERATION),
     # Angles and strains take the place of a displacement, as moments take that of a force: a record holds no other.
     "rad": (1.0, LENGTH), "deg": (math.pi / 180.0, LENGTH), "strain": (1.0, LENGTH), "microstrain": (1e-6, LENGTH),
     **dict.fromkeys(("g", "gn", "g_n"), (STANDARD_GRAVITY, ACCELERATION)),
 }  # fmt: skip
 PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-PREFIXED = ("N", "m", "s", "V", "g", "gn", "rad")
+PREFIXED = ("N", "m", "s", "V", "A", "g", "gn", "rad")
 PLAIN = str.maketrans({
     "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
     "°": "deg",
 })  # fmt: skip
 FACTOR = re.compile(r"([A-Za-z_]+)(?:\^?(-?[0-9]))?")
 ROLES: dict[str, tuple[Powers, str]] = {
-    "force": (FORCE, "N, kN, MN, lbf or V"),
-    "displacement": (LENGTH, "m, mm, um, in, ft or V"),
+    "force": (FORCE, "N, kN, lbf, kgf, V or A"),
+    "displacement": (LENGTH, "m, mm, cm, um, in, ft, rad, deg or V"),
     "velocity": (VELOCITY, "m/s, mm/s, in/s or V"),
     "acceleration": (ACCELERATION, "m/s^2, mm/s^2, g or V"),
     "time": (TIME, "s, ms or us"),
@@ -98,19 +104,22 @@ def _written(plain: str) -> str:
 
 
 def _unknown(text: str) -> StudyError:
-    known = "N, kN, lbf, m, mm, um, in, m/s, m/s^2, g, s, ms and V are known"
+    known = (
+        f"N, kN and mm, in all {', '.join(BASES)} are known, {', '.join(PREFIXED)} with {', '.join(PREFIXES)} before "
+        "them, and products and powers such as mm/s^2"
+    )
     return StudyError(f"there is no unit {excerpt(text, 40)!r}; {known}")
 
 
 def role_unit(role: str, text: str) -> Unit:
     """The unit of a channel such as ``force`` or ``time``, checked against what the channel is.
 
-    Volts are accepted for all but time: an uncalibrated sensor.
+    Volts are accepted for all but time: an uncalibrated sensor. Amperes are for a force alone: the current of a motor.
     """
     unit = parse_unit(text)
     powers, expected = ROLES[role]
     moment = role == "force" and unit.powers == Powers(force=1, length=1)
-    uncalibrated = role != "time" and unit.powers.voltage == 1
+    uncalibrated = role != "time" and unit.powers.uncalibrated and (role == "force" or unit.powers.voltage == 1)
     expect(unit.powers == powers or moment or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
     return unit
 

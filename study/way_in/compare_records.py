@@ -19,8 +19,10 @@ from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
+from study.records.readers.remarks import LEAVING_OUT
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
+from study.records.sampling_rate import low_passed
 from study.support.errors import expect
 
 ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
@@ -49,6 +51,9 @@ def made_ready(
         coordinate or ties it to another, or its masses are not positive definite together.
     """
     model, records, said = driven_alike(records, model, absolute)
+    if layout.highest is not None:
+        below = [low_passed(record, layout.highest) for record in records]
+        records, said = [record for record, _ in below], (*said, below[0][1])
     prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
     drifts = not (prescribed or model.modal or has_spring(model))
     anew = ANEW if len(model.coordinates) > 1 else 0.0
@@ -56,7 +61,9 @@ def made_ready(
     prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew, varies))
     model = with_laid_variations(model, prepared)
     lacks = _unseen(model, prepared)
-    prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
+    noticed = [f"{r.name}: {remark}" if len(records) > 1 else remark for r in records for remark in r.remarks
+               if not (layout.use and LEAVING_OUT in remark)]  # fmt: skip
+    prepared = replace(prepared, near=layout.near or 0.0, notes=(*said, *noticed, *prepared.notes, *lacks))
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 
 

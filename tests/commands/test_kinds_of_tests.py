@@ -215,5 +215,6 @@ def test_an_axis_is_judged_over_a_horizon_and_never_called_chaotic():
     notes = compared("record.csv", "--model", "axis.yaml")["notes"]
     assert any("over a horizon of" in note for note in notes)
     shorter = compared("record.csv", "--model", "axis.yaml", "--horizon", "0.5")["notes"]
-    assert any("over a horizon of 0.5" in note for note in shorter)
+    said = next(note for note in shorter if "over a horizon of" in note)
+    assert float(said.split("over a horizon of ")[1].split()[0]) == pytest.approx(0.5, rel=0.02)
     assert not any("chaotic" in note for note in notes)

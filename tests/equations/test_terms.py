@@ -331,3 +331,40 @@ def test_no_other_module_asks_for_a_term_by_its_name() -> None:
         if isinstance(leaf, ast.Constant) and leaf.value in set(LIBRARY) - set(LINEAR)
     }
     assert not asked
+
+
+@pytest.mark.parametrize(
+    ("heading", "force", "quantities"),
+    [
+        ("friction(vs)", "tanh(v/vs)", ["velocity"]),
+        ("stop(gap)", "max(u - gap, 0)", ["length"]),
+        ("stribeck(a, vs)", "sgn(v)*(1 + a*exp(-abs(v)/vs))", ["number", "velocity"]),
+        ("pull(f)", "u*cos(2*pi*f*t)", ["frequency"]),
+        ("soft(b)", "u/(1 + b*abs(u))", ["1/length"]),
+        ("fading(tau)", "v*exp(-t/tau)", ["time"]),
+        ("pendulum(a)", "sin(u - a)", ["length"]),  # an angle
+    ],
+)
+def test_a_parameter_of_an_own_formula_is_what_its_dimension_says(
+    heading: str, force: str, quantities: list[str]
+) -> None:
+    term = custom(heading, force)
+    assert term.heading == heading
+    assert [p.quantity for p in term.parameters] == quantities
+
+
+@pytest.mark.parametrize(
+    ("heading", "force", "why"),
+    [
+        ("s(k)", "k*sin(u)", "only scales"),
+        ("s(k)", "u/k", "only scales"),
+        ("s(k)", "sin(u)", "lacks its parameter"),
+        ("s(u)", "sin(u)", "means something else"),
+        ("s(k, k)", "tanh(u/k)", "twice"),
+        ("s(a", "tanh(u/a)", "no name of a term"),
+        ("s(a)", "u + v*abs(v) + a", "does not tell what a is"),
+    ],
+)
+def test_a_parameter_that_says_nothing_is_refused(heading: str, force: str, why: str) -> None:
+    with pytest.raises(StudyError, match=why):
+        custom(heading, force)

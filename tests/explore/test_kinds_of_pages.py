@@ -93,6 +93,8 @@ def test_a_browser_draws_every_panel_of_it(kind: str, page: Page, tmp_path: Path
     shown = page.evaluate("[...document.querySelectorAll('[data-panel]')].map((p) => p.dataset.panel)")
     assert set(shown) - {"difference"} <= set(drawn)  # that of the response's panel
     assert wrong == []
+    printed = page.pdf(format="A4", prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type /Page\b", printed)) == 1, "it prints on one sheet"
 
 
 def test_a_component_shows_its_dynamic_stiffness() -> None:

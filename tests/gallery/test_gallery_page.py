@@ -64,9 +64,9 @@ def test_what_is_left_is_no_noise_where_the_last_verdict_says_so(folder):
     text = said(folder)
     assert "**What is found.** says <missing_effect>" in text
     assert re.search(r"\+ hysteresis +\| 10 %", text)
-    assert "10 % of the response (noise floor 2 %): no noise, but nothing with a name either" in text
+    assert "10 % of the response (noise floor 2 %). General functions of the motion explain a part of it" in text
     (folder / "climb/step_1/diagnosis.json").write_text(json.dumps(diagnosis("nothing_missing")))
-    assert "noise, as far as this record can say" in said(folder)
+    assert "noise, as far as this record shows" in said(folder)
     (folder / "climb/step_1/diagnosis.json").write_text(json.dumps(diagnosis("missing_effect")))
     assert "still names dry friction, which the record cannot tell from dead band," in said(folder)
     (folder / "climb/step_1/diagnosis.json").write_text(json.dumps(diagnosis("nothing_missing")))

@@ -323,3 +323,90 @@ def test_the_measured_response_function_is_that_of_the_linear_system_within_its_
     off = np.abs(found.magnitude[0][inside] - found.magnitude[1][inside])
     assert 0.5 < np.mean(off < found.error[inside]) < 0.95
     assert np.all(found.coherence_predicted[inside] > 0.9)
+
+
+def test_the_users_own_candidate_is_shown_whatever_its_rank(found, monkeypatch):
+    from study.diagnose import diagnosis_report
+
+    monkeypatch.setattr(diagnosis_report, "SHOWN", 1)
+    rank = 1 + [c.name for c in found.candidates].index("bushing")
+    assert rank > 1
+    lines = found.table().splitlines()
+    assert any(line.split()[:2] == [str(rank), "bushing"] for line in lines)
+    assert "bushing" in found._repr_html_()
+
+
+def test_an_own_candidate_that_cannot_be_fitted_is_said(fit):
+    found = fit.diagnose({"wall": "exp(30000*u)"}, without=["hysteresis", "relaxation", "periodic_stiffness"])
+    assert list(found.not_fitted) == ["wall"]
+    assert "wall could not be fitted: " in found.says
+    with pytest.raises(st.StudyError, match=r"friction\(vs\)"):
+        fit.diagnose({"own": "tanh(v/vs)"})
+    with pytest.raises(st.StudyError, match="belongs to the library"):
+        fit.diagnose({"inertia": "u*v"})
+
+
+def test_a_parameter_of_an_own_formula_is_fitted():
+    hidden = st.Model(
+        st.term("inertia", value=1.0), st.term("linear_damping", value=3.0), st.term("linear_stiffness", value=355.0),
+        st.term("brake(vs)", force="tanh(v/vs)", value=0.5, vs=0.02), name="braked",
+    )  # fmt: skip
+    record = st.simulate(hidden, st.gaussian(1.0, samples=2048, seed=5), name="braked")
+    found = hidden.drop("brake").free().fit(record, measurement=False).diagnose({"own(vs)": "tanh(v/vs)"})
+    assert found["own"].ranked.effect.parameters["vs"] == pytest.approx(0.02, rel=0.02)
+    assert found["own"].coefficient == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_saved_fit_is_the_start_of_another_and_holds_what_was_held(record, tmp_path):
+    fit = OPEN.hold(m=1.0).fit(record, measurement=False)
+    fit.model.save(tmp_path / "rig.yaml")
+    text = (tmp_path / "rig.yaml").read_text()
+    assert "{term: inertia, value: 1.0}" in text
+    assert text.count("held: false") == 3
+    again = st.Model.load(tmp_path / "rig.yaml").fit(record, measurement=False)
+    assert [key for key, c in again.coefficients.items() if c.held] == ["m"]
+    for key in ("c", "k", "k3"):
+        assert again.coefficients[key].value == pytest.approx(fit.coefficients[key].value, rel=1e-6)
+        assert again.coefficients[key].error == pytest.approx(fit.coefficients[key].error, rel=0.01)
+    held = st.Model.load(tmp_path / "rig.yaml").hold()
+    assert all(c.held for c in held.fit(record, measurement=False).coefficients.values())
+    assert set(st.Model.load(tmp_path / "rig.yaml").free().values.values()) == {None}
+
+
+def test_a_start_may_be_given_and_only_what_has_a_value(tmp_path):
+    model = st.Model("inertia", st.term("dead_band", value=-20.0, u_g=0.01, held=["u_g"]), name="rig")
+    assert model.equation.held_keys == ("dead_band.u_g",)
+    assert list(model.equation.starts.values()) == [-20.0]
+    model.save(tmp_path / "rig.yaml")
+    assert st.Model.load(tmp_path / "rig.yaml") == model
+    with pytest.raises(st.StudyError, match="held of inertia is"):
+        st.term("inertia", value=1.0, held=["c"])
+    with pytest.raises(st.StudyError, match="no 'held' where no value is given"):
+        st.term("inertia", held=["m"])
+
+
+def test_of_two_modes_the_one_that_is_meant_is_fitted():
+    structure = st.Model(
+        st.term("inertia", at="low", value=2.0), st.term("inertia", at="high", value=0.2),
+        st.term("linear_stiffness", between=("ground", "low"), value=4000.0),
+        st.term("linear_stiffness", between=("low", "high"), value=8000.0),
+        st.term("linear_damping", between=("ground", "low"), value=2.0),
+        st.term("linear_damping", between=("low", "high"), value=0.4),
+        name="pair", coordinates=["low", "high"], forces={"shaker": "low"},
+    )  # fmt: skip
+    from study.equations.simulate import simulate
+
+    force = np.random.default_rng(2).standard_normal(8192)
+    shaken = simulate(structure.equation, {"shaker": force}, 1.0 / 256.0)["low acceleration"]
+    record = st.record({"force [N]": force, "acceleration [m/s^2]": shaken}, fs=256.0)
+    assert record.name == "record"
+    coupled = [[12000.0 / 2.0, -8000.0 / 0.4**0.5], [-8000.0 / 0.4**0.5, 8000.0 / 0.2]]
+    first = np.sqrt(np.linalg.eigvalsh(coupled)[0]) / (2.0 * np.pi)
+    single = st.Model("inertia", "linear_damping", "linear_stiffness", name="one")
+    meant = single.fit(record, measurement=False, near=7.0, up_to=15.0)
+    assert meant.f_n.value == pytest.approx(first, rel=0.02)
+    assert meant.error < 0.2 < single.fit(record, measurement=False).error
+    with pytest.raises(st.StudyError, match="too little in common near 500 Hz"):
+        single.fit(record, measurement=False, near=500.0)
+    with pytest.raises(st.StudyError, match="is to be left out; expected 42"):
+        single.fit(record, measurement=False, up_to=100.0)

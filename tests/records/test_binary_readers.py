@@ -177,3 +177,30 @@ def test_heavy_imports_wait() -> None:
     code = "import sys, study.records.readers; print([m for m in ('h5py', 'pyuff', 'pyarrow') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_each_cell_of_matlab_is_a_record(tmp_path: Path) -> None:
+    runs = np.empty(2, dtype=object)
+    runs[0], runs[1] = ({"time": TIME, "force": k * FORCE, "displacement": k * DISPLACEMENT} for k in (1.0, 2.0))
+    savemat(tmp_path / "runs.mat", {"runs": runs})
+    matrices = np.empty((1, 2), dtype=object)
+    matrices[0, 0], matrices[0, 1] = (np.stack([TIME, k * FORCE, k * DISPLACEMENT], axis=1) for k in (1.0, 2.0))
+    savemat(tmp_path / "matrices.mat", {"runs": matrices})
+    with pytest.raises(StudyError, match="choose --group runs/1 or runs/2"):
+        read_record(tmp_path / "runs.mat")
+    by_number: dict[str, str | int] = {"time": 1, "force": 2, "displacement": 3}
+    for path, columns in ((tmp_path / "runs.mat", {}), (tmp_path / "matrices.mat", by_number)):
+        record = read_record(path, ReadOptions(columns, group="runs/2"))
+        assert record.name == f"{path.stem}_runs_2"
+        np.testing.assert_array_equal(record["force"], 2.0 * FORCE)
+
+
+def test_each_cell_of_matlab_7_3_is_a_record(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "runs.mat", "w") as file:
+        kept = file.create_group("#refs#")
+        for name, k in (("a", 1.0), ("b", 2.0)):
+            for channel, values in (("time", TIME), ("force", k * FORCE), ("displacement", k * DISPLACEMENT)):
+                kept[f"{name}/{channel}"] = values
+        file["runs"] = np.array([kept["a"].ref, kept["b"].ref], dtype=h5py.ref_dtype)
+    record = read_record(tmp_path / "runs.mat", ReadOptions(group="runs/2"))
+    np.testing.assert_array_equal(record["displacement"], 2.0 * DISPLACEMENT)

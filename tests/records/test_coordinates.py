@@ -108,7 +108,8 @@ def test_what_stands_beside_the_file_counts_for_structures(tmp_path: Path) -> No
 def test_no_option_is_forgotten_here() -> None:
     """Faults and thinning, which are said beside a file too, are no matter of reading it."""
     assert set(KEYS) - {"measurement", "as_sampled"} == {
-        "columns", "units", "dt", "fs", "group", "samples", "period", "accept_saturated", "accept_swapped", "free",
+        "columns", "units", "dt", "fs", "group", "samples", "period", "accept_saturated", "accept_swapped",
+        "free", "scale",
     }  # fmt: skip
 
 

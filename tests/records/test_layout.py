@@ -65,6 +65,20 @@ def test_a_sweep_is_judged_in_every_other_block():
     assert not laid_out([swept], Layout(), KindOfTest(unbroken=True)).record.joints
 
 
+@pytest.mark.parametrize("loud", [slice(0, 2048), slice(2048, SAMPLES)])
+def test_blocks_are_judged_in_turn_where_one_half_is_noise(loud: slice):
+    record = of_two(force(RANDOM, SAMPLES, DT, 1))
+    size = np.full(SAMPLES, 0.05)
+    size[loud] = 1.0
+    died = record.with_channels({name: size * values for name, values in record.channels.items()})
+    prepared = laid_out([died], Layout())
+    assert prepared.record.joints
+    assert any(note.startswith("one half of the record is nearly at rest") for note in prepared.notes)
+    assert not laid_out([died], Layout(fit=(0, 2048))).record.joints
+    half = record.with_channels({name: np.sqrt(size) * values for name, values in record.channels.items()})
+    assert not laid_out([half], Layout()).record.joints, "a fifth of the motion is no rest"
+
+
 def test_a_record_that_rests_in_one_half_is_halved_where_it_moves():
     drive = force(RANDOM, SAMPLES, DT, 1)
     still = np.arange(SAMPLES) < 3000

@@ -199,7 +199,8 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
             beside = "" if name in motion else " beside force and motion"
             raise StudyError(
                 f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}; "
-                "expected one that it has"
+                f"expected one that it has, or {channel!r} named as a parameter to be fitted, as vs is in "
+                "'friction(vs)=tanh(v/vs)'"
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns

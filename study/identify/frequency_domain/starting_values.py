@@ -25,7 +25,7 @@ from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, cross_spectra, cross_spectra_within, segment_length
 from study.support.arrays import Complexes, Floats
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares, normal_inverse
 
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
@@ -52,6 +52,14 @@ class LinearApproximation:
         """Whether the lines are as few and as near as those that a Hann window makes of one frequency."""
         return self.neighbours <= MAIN_LOBE
 
+    def around(self, frequency: float) -> "LinearApproximation":
+        """The lines within half an octave of a frequency in hertz."""
+        keep = np.abs(np.log2(np.abs(self.omega) / (2.0 * np.pi * frequency))) < 0.5
+        return replace(
+            self, omega=self.omega[keep], receptance=self.receptance[keep], weight=self.weight[keep],
+            neighbours=int(np.count_nonzero(keep)),
+        )  # fmt: skip
+
 
 def coherent_lines(prepared: Prepared) -> LinearApproximation:
     """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records."""
@@ -59,6 +67,11 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
     part = record.part(*prepared.plan.fit)
     length = segment_length(len(part), held=8, fewest=16, most=1024)
     found, _ = _lines(part, response, length)
+    if prepared.near:
+        found = _lines(part, response, _resolving(prepared.near, part, length))[0].around(prepared.near)
+        beside = f"force and {response} of {record.name!r} have too little in common near {prepared.near:g} Hz"
+        expect(len(found.omega) >= FEWEST_LINES, f"{beside}; expected the frequency of a mode that the record shows")
+        return found
     if len(found.omega) >= FEWEST_LINES:
         return found
     while len(part) >= SHORT and length < len(part) // 2:
@@ -75,6 +88,12 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
         f"force and {response} of {record.name!r} have nothing in common at any frequency; expected a response to this "
         "force (are the columns and the samples of one measurement?)"
     )
+
+
+def _resolving(frequency: float, part: Record, length: int) -> int:
+    """Samples in a segment that has lines enough around a frequency, as far as the part is long enough."""
+    wanted = 4.0 * FEWEST_LINES / (frequency * part.dt)
+    return int(min(max(length, 2 ** np.ceil(np.log2(wanted))), len(part) // 2))
 
 
 def _lines(part: Record, response: str, length: int) -> tuple[LinearApproximation, float]:
@@ -110,6 +129,22 @@ def solved(lines: LinearApproximation, wanted: Sequence[str]) -> tuple[Floats, F
     return solution, np.sqrt(np.diag(normal_inverse(columns.T @ columns)).clip(0.0) * variance)
 
 
+def _mode_among_others(lines: LinearApproximation) -> Floats:
+    """k, c and m of one mode, beside which all others count as a constant flexibility R over the lines.
+
+    ``H = 1/(m (s^2 + 2 zeta w s + w^2)) + R``, multiplied out, is linear in what it holds; shape (3,).
+    """
+    size = float(np.mean(np.abs(lines.omega)))
+    s, h = lines.omega / size, lines.receptance / np.mean(np.abs(lines.receptance))
+    weight = lines.weight / np.abs(h) ** 2
+    design = np.stack([h, h * s, -np.ones_like(s), -s, -(s**2)], axis=1) * weight[:, None]
+    target = -(s**2) * h * weight
+    columns, goal = np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag])
+    a0, a1, b0, _, b2 = least_squares(columns, goal)
+    m = 1.0 / ((b0 - b2 * a0) * np.mean(np.abs(lines.receptance)) * size**2)
+    return m * np.array([a0 * size**2, a1 * size, 1.0])
+
+
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Masses, dampings and stiffnesses of the best linear approximation; zero for everything else.
 
@@ -134,6 +169,8 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     lines = coherent_lines(prepared)
     wanted = [key for key in LINEAR_ORDERS if key in model.values]
     solution, _ = solved(lines, wanted)
+    if prepared.near and len(wanted) == len(LINEAR_ORDERS):
+        solution = _mode_among_others(lines)
     start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
     if start["m"] <= 0.0:
         target = lines.weight / lines.receptance

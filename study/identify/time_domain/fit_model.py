@@ -93,6 +93,10 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         return settled(
             fit_part(model, prepared, model.held_keys, start, steps=rough_steps(model, prepared, start)), prepared
         )
+    if model.starts and set(model.starts) == {key for key, value in model.values.items() if value is None}:
+        begun = _tried(model, prepared, model.held_keys, model.starts, KEPT)
+        if begun is not None and begun.converged:
+            return _followed(settled(begun, prepared), model, prepared)
     changes = tuple(t for t in model.terms if t.term.variation and None in t.coefficients)
     unknown = (*(t for t in model.terms if None in t.parameters and t not in changes), *changes)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
@@ -160,9 +164,13 @@ def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
 
 
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
-    """Where a fit from nothing begins: the best linear approximation, and the reverse system's solution if any."""
+    """Where a fit from nothing begins: the best linear approximation, and the reverse system's solution if any.
+
+    With what the model says of starts; near a mode that the user names by that alone.
+    """
     linear = linear_start(model, prepared)
-    starts = [linear, linear | _reversed(model, prepared)]
+    given = [linear | model.starts] if model.starts or prepared.near else []
+    starts = given if prepared.near else [*given, linear, linear | _reversed(model, prepared)]
     omega = driven_at(model, prepared)
     if omega:  # only the transient tells the mass, and a fit begun at another resonance loses step with it
         steady = linear["k"] - linear["m"] * omega**2

@@ -35,7 +35,8 @@ class MotionRange:
         u, v = self.motion @ direction
         for parameter in term.parameters:
             value, error = values.get(parameter.name, math.nan), errors.get(parameter.name, 0.0)
-            if math.isnan(value) or parameter.relative or parameter.quantity in ("frequency", OF_VARIATION):
+            otherwise = parameter.quantity in ("frequency", "number", OF_VARIATION)
+            if math.isnan(value) or parameter.relative or otherwise:
                 continue
             low, high = self._limits(parameter.quantity, u, v)
             if parameter.signed and parameter.quantity == "length":

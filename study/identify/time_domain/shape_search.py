@@ -268,6 +268,8 @@ def values_to_try(
             tried = np.concatenate([places, sharp]) * (1.0 / float(np.std(u)))
         case "shares of the one before":
             tried = places * point[-1]
+        case "numbers":
+            tried = places
         case kind:
             tried = lines(kind, places)
     return [float(x) for x in tried]

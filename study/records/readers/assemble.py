@@ -1,12 +1,13 @@
 """From columns to a record: roles, units, sampling interval, and every check a channel must pass."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from study.records.readers import checks
+from study.records.readers import checks, remarks
 from study.records.readers.options import ReadOptions
 from study.records.readers.roles import Roles, assign, own_unit
 from study.records.readers.table import Column, Table
@@ -18,6 +19,7 @@ from study.support.terminal import on_a_line
 from study.support.units import is_unit, parse_unit, role_unit
 
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
+T = TypeVar("T", str, float)
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
@@ -31,9 +33,11 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     lengths = {len(column.values) for column in columns.values()}
     each = ", ".join(f"{channel} ({column.name!r}) has {len(column.values)}" for channel, column in columns.items())
     expect(len(lengths) == 1, f"{path}: channels differ in length: {each} samples; expected the same number for all")
-    given = _given_units(path, columns, options, roles)
+    given = _for_channels(path, "unit", options.units, columns, roles)
+    scale = _for_channels(path, "scale", options.scale, columns, roles)
+    expect("time" not in scale, f"{path}: a scale is given for time; expected a unit of it, such as --unit time=ms")
     _check_apart(path, columns, roles)
-    units = _units(path, columns, given, roles)
+    units = _units(path, columns, given, roles, scale)
     length, (first, end) = lengths.pop(), options.samples or (0, None)
     last, asked = (length, f"from {first} on") if end is None else (end, f"{first} to {end}")
     within = f"the record has {length}; expected a range within, counted from 0"
@@ -44,7 +48,7 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     kept = {channel: replace(c, values=c.values[first:last]) for channel, c in columns.items()}
     kept = _usable(path, kept, cut, options, roles)
     dt, start = _sampling(path, kept, units, cut, options, first)
-    channels = {channel: c.values for channel, c in kept.items() if channel != "time"}
+    channels = {channel: c.values * scale.get(channel, 1.0) for channel, c in kept.items() if channel != "time"}
     still = {force: np.zeros(last - first) for force in roles.forces if force not in channels}  # a free decay
     usual = {"time": "s"} | {channel: SI_UNITS[kind] for channel, kind in roles.kinds.items()}
     named = {channel: unit for channel, unit in units.items() if channel in channels}
@@ -53,9 +57,13 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     name = path.resolve().parent.name if simulated else path.stem
     name = f"{name}_{options.group.strip('/').replace('/', '_')}" if options.group else name
     name = on_a_line(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
-    return Record(
+    record = Record(
         dt, channels | still, usual | named, name, start, period, coordinates=roles.coordinates, forces=roles.forces
     )
+    scaled = [
+        f"{channel} is the column {columns[channel].name!r} times {factor:g}" for channel, factor in scale.items()
+    ]
+    return replace(record, remarks=(*scaled, *remarks.on_units(record, units), *remarks.on_samples(record)))
 
 
 def _check_apart(path: Path, columns: Mapping[str, Column], roles: Roles) -> None:
@@ -73,27 +81,35 @@ def _check_apart(path: Path, columns: Mapping[str, Column], roles: Roles) -> Non
             expect(not same, f"{path}: {force} and {motion} hold the same numbers; expected two measured channels")
 
 
-def _given_units(path: Path, columns: Mapping[str, Column], options: ReadOptions, roles: Roles) -> dict[str, str]:
-    """The units that the user gives, by channel; one of ``force`` or of a motion is that of all such channels."""
-    given: dict[str, str] = {}
-    for role, unit in options.units.items():
+def _for_channels(
+    path: Path, kind: str, given: Mapping[str, T], columns: Mapping[str, Column], roles: Roles
+) -> dict[str, T]:  # fmt: skip
+    """What the user gives, by channel; of a kind that of all such; a column's name will do."""
+    found: dict[str, T] = {}
+    for role, value in given.items():
         channel = roles.said(role) or role
         meant = [channel] if channel in (*columns, "time") else [c for c in columns if roles.kinds.get(c) == role]
-        expect(meant, f"{path}: a unit is given for {role!r}; {', '.join(columns)} are the channels")
-        given = dict.fromkeys(meant, unit) | given if len(meant) > 1 else given | {meant[0]: unit}
-    return given
+        meant = meant or [c for c, column in columns.items() if column.name.rsplit("/", 1)[-1] == role]
+        expect(meant, f"{path}: a {kind} is given for {role!r}; {', '.join(columns)} are the channels")
+        found = dict.fromkeys(meant, value) | found if len(meant) > 1 else found | {meant[0]: value}
+    return found
 
 
 def _units(
-    path: Path, columns: Mapping[str, Column], given: Mapping[str, str], roles: Roles
-) -> dict[str, str]:  # fmt: skip
-    """Unit of each channel, as records write it; an extra channel's may be anything."""
+    path: Path, columns: Mapping[str, Column], given: Mapping[str, str], roles: Roles, scale: Collection[str] = ()
+) -> dict[str, str]:
+    """Unit of each channel, as records write it; an extra channel's may be anything.
+
+    That of a channel with a scale is what is given, whatever the file says.
+    """
     units: dict[str, str] = {}
     for channel, column in columns.items():
         kind = roles.kinds.get(channel, "")
         own = own_unit(column, kind)
         text = given.get(channel) or own
-        if is_unit(text) and is_unit(own):  # two that differ: one is a factor wrong, and nobody knows which
+        if (
+            is_unit(text) and is_unit(own) and channel not in scale
+        ):  # two that differ: one is a factor wrong, and nobody knows which
             one, other = parse_unit(text), parse_unit(own)
             expect(
                 one.powers == other.powers and abs(one.factor / other.factor - 1.0) < LAST_DIGITS,

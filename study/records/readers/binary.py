@@ -23,18 +23,28 @@ DIRECTIONS = {-3: "-Z", -2: "-Y", -1: "-X", 0: "", 1: "+X", 2: "+Y", 3: "+Z"}
 def read_hdf5(path: Path, group: str | None) -> Table:
     """Every dataset of numbers of a file, or of one group of it, by its path.
 
-    ``#refs#`` holds what MATLAB refers to from cells.
+    ``#refs#`` holds what MATLAB refers to from cells, each of which is a group of its own: ``runs/1``, ``runs/2``.
     """
     h5py: Any = needed("h5py", f"{path}: reading HDF5", "formats")
-    names: list[str] = []
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-            names.append(name)
+    found: dict[str, Any] = {}
 
     with h5py.File(path, "r") as file:
-        file.visititems(visit)
-        datasets: dict[str, Any] = {name: file[name] for name in in_group(path, names, group, "group")}
+
+        def put(name: str, item: Any, deeper: int = 0) -> None:
+            if isinstance(item, h5py.Group):
+                for key, inner in item.items():
+                    put(f"{name}/{key}", inner, deeper)
+            elif h5py.check_ref_dtype(item.dtype) and deeper < 4:
+                for number, cell in enumerate(file[ref] for ref in item[()].ravel() if ref):
+                    one = f"{name}/{number + 1}"
+                    put(one if isinstance(cell, h5py.Group) else f"{one}/{name.rpartition('/')[2]}", cell, deeper + 1)
+            else:
+                found[name] = item
+
+        for key, item in file.items():
+            if not key.startswith("#"):
+                put(key, item)
+        datasets: dict[str, Any] = {name: found[name] for name in in_group(path, found, group, "group")}
         numbers = {name: data for name, data in datasets.items() if data.dtype.kind in "biufc"}
         units = {name: _unit(data.attrs) for name, data in numbers.items()}
         return from_arrays(path, {name: np.asarray(data[()]) for name, data in numbers.items()}, units)
@@ -46,7 +56,10 @@ def _unit(attributes: Any) -> str:
 
 
 def read_matlab(path: Path, group: str | None) -> Table:
-    """Every array of numbers of a file in format 4 or 5, or of one structure in it; its fields by ``name/field``."""
+    """Every array of numbers of a file in format 4 or 5, or of one structure in it; its fields by ``name/field``.
+
+    Of cells and of several structures each has a number: ``runs/1/force``.
+    """
     loaded: dict[str, Any] = loadmat(str(path), simplify_cells=True, appendmat=False)
     arrays = dict(_flat({k: v for k, v in loaded.items() if not k.startswith("__")}, ""))
     return from_arrays(path, {name: arrays[name] for name in in_group(path, arrays, group, "structure")}, {})
@@ -54,10 +67,25 @@ def read_matlab(path: Path, group: str | None) -> Table:
 
 def _flat(fields: dict[str, Any], prefix: str) -> Iterator[tuple[str, object]]:
     for name, value in fields.items():
+        cells = _cells(value)
         if isinstance(value, dict):
             yield from _flat(cast("dict[str, Any]", value), f"{prefix}{name}/")
+        elif cells and not all(isinstance(one, str) for one in cells):  # texts are no records
+            for number, one in enumerate(cells, start=1):
+                inner = cast("dict[str, Any]", one) if isinstance(one, dict) else {name: one}
+                yield from _flat(inner, f"{prefix}{name}/{number}/")
         elif isinstance(value, np.ndarray) or np.isscalar(value):
             yield f"{prefix}{name}", value
+
+
+def _cells(value: object) -> list[object]:
+    """The cells of a cell array, or the structures of an array of these; none of anything else."""
+    if isinstance(value, list):
+        return cast("list[object]", value)
+    if not isinstance(value, np.ndarray):
+        return []
+    array = cast("np.ndarray[Any, np.dtype[Any]]", value)
+    return list(array.ravel()) if array.dtype == object else []
 
 
 def read_parquet(path: Path, _group: str | None = None) -> Table:

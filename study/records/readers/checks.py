@@ -187,6 +187,59 @@ def suspect_swapped(record: Record) -> str | None:
     The measured motion nearest to displacement is used. A record that is too short, or whose band holds no resonance
     and no mass, cannot tell.
     """
+    lines = _lines(record)
+    if lines is None:
+        return None
+    given, swapped = lines.fit(), lines.swapped()
+    if _is_mechanical(given) or not _is_mechanical(swapped) or swapped.error > BETTER * given.error:
+        return None
+    if swapped.mass * lines.omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
+        return None
+    force, named = record.forces[0], str(lines.sensor).replace(" ", ".")
+    return (
+        f"{force} and {lines.sensor} seem to be swapped: read the other way round, their ratio is that of a mass on a "
+        f"spring to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
+        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column {force}=... --column {named}=... "
+        "with the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like "
+        "that)"
+    )
+
+
+def suspect_sign(record: Record) -> str | None:
+    """A sentence if the force seems to have the wrong sign: read with the other one it drives a mass on a spring.
+
+    Told as in :func:`suspect_swapped`; doubted only where mass, damping and stiffness all come out negative.
+    """
+    lines = _lines(record)
+    given = None if lines is None else lines.fit()
+    if given is None or max(given.mass, given.damping, given.stiffness) >= 0.0 or given.error > BETTER:
+        return None
+    force = record.forces[0]
+    return (
+        f"the sign of {force} seems to be wrong: as given it asks for a negative mass, damping and stiffness, with the "
+        f"other sign all are positive (--scale {force}=-1 turns it round)"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Force over displacement, line by line, as far as force and motion are coherent."""
+
+    sensor: Sensor
+    omega: Floats
+    ratio: Complexes  # of force over this motion, of the same size as motion over force
+    turn: Complexes  # from this motion to what it is the derivative of
+    weight: Floats
+
+    def fit(self) -> _Fit:
+        return _fit(self.omega, self.ratio * self.turn, self.weight)
+
+    def swapped(self) -> _Fit:
+        return _fit(self.omega, self.turn / self.ratio, self.weight)
+
+
+def _lines(record: Record) -> _Lines | None:
+    """None where a record is too short or too incoherent to tell."""
     (force,), sensor = record.forces, next(s for m in MOTIONS if (s := Sensor(record.coordinates[0], m)) in record)
     length = min(1024, len(record) // 8)  # 500 lines are plenty for three coefficients
     if length < 4 * FEWEST_LINES:
@@ -199,23 +252,10 @@ def suspect_swapped(record: Record) -> str | None:
     keep[:2] = False  # offset and drift
     if np.count_nonzero(keep) < FEWEST_LINES:
         return None
-    omega, weight = 2.0 * np.pi * frequency[keep], weight[keep]
-    turn = (1j * omega) ** MOTIONS.index(sensor.motion)  # from this motion to what it is the derivative of
-    ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])  # the same for both readings
-    given = _fit(omega, ratio * turn, weight)
-    swapped = _fit(omega, turn / ratio, weight)
-    if _is_mechanical(given) or not _is_mechanical(swapped) or swapped.error > BETTER * given.error:
-        return None
-    if swapped.mass * omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
-        return None
-    named = str(sensor).replace(" ", ".")
-    return (
-        f"{force} and {sensor} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
-        f"to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
-        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column {force}=... --column {named}=... "
-        "with the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like "
-        "that)"
-    )
+    omega = 2.0 * np.pi * frequency[keep]
+    ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])
+    turn = np.asarray((1j * omega) ** MOTIONS.index(sensor.motion), dtype=np.complex128)
+    return _Lines(sensor, omega, ratio, turn, weight[keep])
 
 
 def _is_mechanical(fit: _Fit) -> bool:

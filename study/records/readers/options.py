@@ -11,7 +11,7 @@ from study.support.files import read_text
 from study.support.yaml_text import as_list, as_mapping, read_plain, shown
 
 BESIDE = ".record.yaml"
-WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
+WANTED = "a YAML file with 'columns', 'units', 'scale', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,9 @@ class ReadOptions:
     measurement: Mapping[str, float | Mapping[str, float] | None] | None = None
     free: bool = False  # no force acts: a free decay
     as_sampled: bool = False  # all samples are used, though the motion asks for fewer
+    # Role to a factor on the numbers of its column, -1 for a force with the wrong sign; a unit that is given is that of
+    # the product: {"force": -31.0} and {"force": "N"} for a motor that pulls with 31 N/A.
+    scale: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         if self.dt is not None and self.fs is not None:
@@ -45,6 +48,9 @@ class ReadOptions:
                 raise StudyError(f"{name} is {value:g}; expected a number above zero")
         expect(self.period is None or self.period > 1, f"period is {self.period}; expected at least 2 samples")
         first, last = self.samples or (0, None)
+        for role, factor in self.scale.items():
+            usable = math.isfinite(factor) and factor != 0.0
+            expect(usable, f"the scale of {role} is {factor:g}; expected a factor such as -1 or 31.0")
         ordered = first >= 0 and (last is None or last > first)
         expect(ordered, f"samples is {first} to {last}; expected a first sample of 0 or more and a later last one")
 
@@ -63,7 +69,7 @@ class ReadOptions:
             self.period if self.period is not None else other.period,
             self.accept_saturated or other.accept_saturated, self.accept_swapped or other.accept_swapped,
             self.measurement if self.measurement is not None else other.measurement,
-            self.free or other.free, self.as_sampled or other.as_sampled,
+            self.free or other.free, self.as_sampled or other.as_sampled, {**other.scale, **self.scale},
         )  # fmt: skip
 
 
@@ -106,6 +112,7 @@ def read_options(path: Path) -> ReadOptions:
             samples=_samples(given.get("samples")),
             period=_whole("period", given.get("period")),
             measurement=_measurement(given),
+            scale={role: _known(f"the scale of {role}", x, "a factor") for role, x in _mapping(given, "scale").items()},
             **{name: _flag(name, given.get(name, False)) for name in flags},
         )
 

@@ -1,0 +1,62 @@
+"""A diagnosis on one page: what stands on it, and that it is one sheet."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.font_manager import FontProperties
+
+from study.diagnose import one_page_files
+from study.diagnose.diagnosis_files import all_names
+from study.diagnose.one_page import equation_in_symbols, one_page
+from study.diagnose.verdict import diagnose
+from study.records.record import Record, Stretch
+from study.trials import make_trial
+from study.way_in.compare_records import compare_records
+
+
+@pytest.fixture(scope="module")
+def content():
+    trial = make_trial(901, hidden=["quadratic_damping"], noise=0.01, response="displacement")
+    without = ("hysteresis", "relaxation", "periodic_stiffness", "harmonic_force", "cogging")
+    return one_page(diagnose(compare_records([trial.record], trial.believed).comparison, without=without))
+
+
+def test_the_page_says_what_is_missing_before_and_after(content):
+    assert content.headline == "Quadratic damping is missing from the equation"
+    assert content.equation == "m d^2u/dt^2 + c v + k u = F(t)"
+    assert content.completed == "m d^2u/dt^2 + c v + k u + c2 v|v| = F(t)"
+    assert content.after.prediction.error < content.before.prediction.error
+    assert [row[0] for row in content.coefficients] == ["m", "c", "k", "c2"]
+    assert "were asked for" in content.says[1]
+
+
+def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
+    files = one_page_files.one_page_files(content)
+    assert len(re.findall(rb"/Type /Page\b", files["report.pdf"])) == 1
+    assert files == one_page_files.one_page_files(content)  # the same bytes again
+    text = files["report.html"].decode()
+    assert "v|v|" in text
+    assert "<sup>2</sup>" in text
+    assert "http" not in text.replace("http://www.w3.org", "")
+    monkeypatch.setattr(one_page_files._Sheet, "most", 3)
+    assert one_page_files._first(content.coefficients)[-1][0] == "and 2 more"
+
+
+def test_lines_are_no_wider_than_the_sheet():
+    font = FontProperties(size=9.0)
+    words = "the error of the response falls from 69.2 % to 0.342 % " * 5
+    wide = one_page_files.lines(words, font, 6.0)
+    assert " ".join(wide) == words.strip()
+    measure = one_page_files.TEXT_TO_PATH.get_text_width_height_descent
+    widths = [measure(line, font, ismath=False)[0] / 72.0 for line in wide]
+    assert max(widths) <= 6.0
+    assert min(widths[:-1]) > 5.0
+
+
+def test_a_decay_has_no_force_and_several_records_their_names(systems):
+    assert equation_in_symbols(systems["linear"], free=True).endswith("k u = 0")
+    records = [Record(0.1, {"force": np.zeros(40)}, name=name) for name in "abcde"]
+    strung = [replace(records[0], stretches=tuple(Stretch(r, 0, 40) for r in records[:n])) for n in (0, 3, 5)]
+    assert [all_names(record) for record in strung] == ["a", "a, b and c", "a, b and 3 more"]
