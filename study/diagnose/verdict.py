@@ -280,7 +280,7 @@ def _necessary(sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
     if core is None:
         return None
     row = rank(with_best_settled([core], comparison.prepared), comparison, asked + len(search.tried))[0]
-    return row if row.gain.explained >= MOST and not row.unphysical else None
+    return row if row.gain.explained >= NEARLY and not row.unphysical else None
 
 
 def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:

@@ -183,8 +183,8 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
     coherent = (scores[:, :1] * amounts[0] * scores).reshape(count, lines, -1)
     between = np.asarray(np.sum(coherent, axis=0), dtype=np.float64)
     together = between.T @ between - np.einsum("ilp,ilq->pq", coherent, coherent)
-    variance = inverse + inverse @ together @ inverse
-    error = float(np.sqrt(variance[0, 0] / KEPT))
+    variance = inverse + inverse @ together @ inverse  # never below that of spectra that tell of nothing in common
+    error = float(np.sqrt(max(variance[0, 0], inverse[0, 0]) / KEPT))
     return _Noise(float(amounts[0]) / level, error / level, cost, float(amounts[0]))
 
 

@@ -75,10 +75,10 @@ def test_an_effect_explains_more_than_what_is_left_or_goes(monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("sets", "explained", "unphysical", "core"),
     [
-        (("abc", "abd", "abf"), 0.9, "", "ab"),
-        (("abc", "ad"), 0.9, "", "a"),
+        (("abc", "abd", "abf"), 0.95, "", "ab"),
+        (("abc", "ad"), 0.95, "", "a"),
         (("abc", "d"), 0.9, "", None),  # they have nothing alike
-        (("abc", "abd"), 0.4, "", None),  # what they have alike explains little
+        (("abc", "abd"), 0.8, "", None),  # what they have alike does not explain nearly all
         (("abc", "abd"), 0.9, "a mass is positive", None),
     ],
 )

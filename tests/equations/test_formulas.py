@@ -66,7 +66,7 @@ def grown(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= formulas.LONGEST))
+@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= formulas.CHARACTERS))
 def test_random_valid_formulas_agree_with_numpy(value_of: Callable[..., np.ndarray], text: str) -> None:
     with np.errstate(all="ignore"):
         expected = by_numpy(text)
@@ -147,7 +147,7 @@ def test_any_text_is_a_formula_or_an_expression_error(text: str) -> None:
 
 def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
     text = "u" + "*1" * 30
-    padded = text + " " * (formulas.LONGEST - len(text))
+    padded = text + " " * (formulas.CHARACTERS - len(text))
     build(padded)
     with pytest.raises(ExpressionError, match="301 characters"):
         build(padded + " ")

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from study.reproduction import study_pages, whole_page
-from study.reproduction.study_pages import LONGEST, conditions, shortened
+from study.reproduction.study_pages import TABLE_WIDTH, conditions, shortened
 from study.support import document
 from study.support.document import Picture
 from tests.reproduction.test_summary import CLAIMS, study
@@ -76,7 +76,7 @@ def test_a_claim_has_one_line_and_its_conditions_are_folded():
     text = document.markdown(study_pages.titled("claims", results))
     lines = [line for line in text.splitlines() if line.startswith("| [")]
     assert len(lines) == 4
-    assert all(len(cell) <= LONGEST + 10 for line in lines for cell in line.split("|") if cell.strip())
+    assert all(len(cell) <= TABLE_WIDTH + 10 for line in lines for cell in line.split("|") if cell.strip())
     assert text.count("<details>") == 4
     assert '<a id="long"></a>' in text
     assert "(#long)" in text
@@ -95,7 +95,7 @@ def test_every_part_of_what_was_measured_stands_in_the_fold():
 
 def test_what_does_not_fit_a_line_is_cut_between_words_and_says_so():
     assert shortened({"reported": "1, 2", "measured": "a 1; b 2"}) == "a 1; b 2"
-    assert shortened({"reported": "1, 2", "measured": f"a 1; {'b' * LONGEST}"}) == "a 1 …"
+    assert shortened({"reported": "1, 2", "measured": f"a 1; {'b' * TABLE_WIDTH}"}) == "a 1 …"
     long = shortened({"reported": "1", "measured": "word " * 60})
     assert long.endswith("word …")
-    assert len(long) <= LONGEST + 2
+    assert len(long) <= TABLE_WIDTH + 2

@@ -70,7 +70,7 @@ def test_a_fault_within_a_package_is_not_a_missing_package(tmp_path, monkeypatch
 def test_every_extra_that_is_named_is_there_and_dev_has_them_all():
     extras = PROJECT["optional-dependencies"]
     assert {"workflow", "explore", "formats", "docs"} <= set(extras)
-    assert f"{PROJECT['name']}[workflow,explore,formats,docs]" in extras["dev"]
+    assert f"{PROJECT['name']}[workflow,explore,formats,data,docs]" in extras["dev"]
 
 
 def test_what_is_no_python_is_installed_too():
