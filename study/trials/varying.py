@@ -22,7 +22,7 @@ from study.trials.draw import Trial
 from study.trials.effects import evenly_in_log, linear_oscillator
 from study.way_in.compare_records import compare_records
 
-VARYING = ("drift", "step", "schedule", "schedule_and_nonlinearity", "nonlinear", "nothing")
+KINDS_OF_CHANGES = ("drift", "step", "schedule", "schedule_and_nonlinearity", "nonlinear", "nothing")
 NONLINEAR = ("cubic_stiffness", "quadratic_damping", "coulomb_friction", "quadratic_stiffness")
 ACTS_ON = {"linear_stiffness": "u", "linear_damping": "v"}
 
@@ -31,7 +31,7 @@ def make_varying_trial(
     kind: str, seed: int, *, of: str | None = None, change: float | None = None, noise: float | None = None,
     samples: int = 8192,
 ) -> Trial:  # fmt: skip
-    """A trial of one of the kinds ``VARYING``; what is given is not drawn.
+    """A trial of one of the kinds ``KINDS_OF_CHANGES``; what is given is not drawn.
 
     The coefficient ``of`` stiffness or damping changes by a share of itself, 3 to 30 % of a stiffness and 10 to 60 % of
     a damping, which shows less. ``noise`` is the rms of the noise over that of the response. Every record has a channel

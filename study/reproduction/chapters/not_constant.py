@@ -199,7 +199,7 @@ def varying_moment(tables: Tables, expected: Reported) -> Iterator[Condition]:
 # ---- figures and words
 
 
-def varying_figure(tables: Tables) -> Figure:
+def not_constant_figure(tables: Tables) -> Figure:
     """What constant and varying coefficients leave, and the moment of a step."""
     figure, axes = page.empty_page(
         "Coefficients that are not constant", "what is left, and when the stiffness stepped", columns=2, width=11.0,
@@ -252,7 +252,7 @@ def told_varying(tables: Tables) -> list[Block]:
 
 CHAPTER = Chapter(
     judges(varying_in_reverse, varying_free_run, varying_coherence, varying_left, varying_mathieu, varying_moment),
-    {"varying": varying_figure}, told_varying,
+    {"varying": not_constant_figure}, told_varying,
     ("limit.varying_value", "varying_coherence.coherence", "varying_left.times", "varying_moment.seconds",
      *(f"varying_mathieu.{name}" for name in ("f_m", "k_m", "m", "k", "c"))),
     make=make_varying,
