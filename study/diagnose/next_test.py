@@ -128,7 +128,10 @@ def next_test(
         listed = sorted([*good, *shorter], key=lambda choice: choice.design.effort)
         heard = [listed[0], listed[len(listed) // 2], found[0]]
     else:
-        further = [_screened(rivals, one.design, sensor) for one in found[:4] for sensor in extra]
+        # what these sensors do not see at all says nothing of which test others would see: the same signal is asked too
+        like_this = (choice for choice in found if choice.design.kind == present.kinds[0][0])
+        asked_with = list(dict.fromkeys([*found[:4], *islice(like_this, 2)]))
+        further = [_screened(rivals, one.design, sensor) for one in asked_with for sensor in extra]
         asked += len(further)
         every = [*found, *(choice for choice in further if choice is not None)]
         heard = list(islice(_different(sorted(every, key=lambda choice: choice.merit, reverse=True)), 3))
