@@ -6,7 +6,7 @@ alone gets :func:`identifiers`.
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.equations_of_motion import Equations
@@ -68,6 +68,8 @@ def exported(model: Model, record: Record | None = None) -> Exported:
     Units are those of the ``record`` that it was fitted to, in which its values are; N, m and s if there is none. A
     ``StudyError`` names what is not known.
     """
+    known = model.with_values({**model.values, **model.starts})  # what a fit saved is its start, and known here
+    model = replace(known, terms=tuple(replace(entry, starts=()) for entry in known.terms))
     open_keys = [key for key, value in model.values.items() if value is None]
     expect(
         not open_keys,

@@ -179,7 +179,8 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
         if before - cost < 1e-6:
             break
     scores = columns / (columns @ amounts)[:, None]
-    inverse = np.asarray(np.linalg.pinv(scores.T @ scores), dtype=np.float64)
+    half = np.asarray(np.linalg.pinv(scores), dtype=np.float64)
+    inverse = half @ half.T
     coherent = (scores[:, :1] * amounts[0] * scores).reshape(count, lines, -1)
     between = np.asarray(np.sum(coherent, axis=0), dtype=np.float64)
     together = between.T @ between - np.einsum("ilp,ilq->pq", coherent, coherent)

@@ -43,7 +43,9 @@ def test_sets_of_simple_effects_are_worth_a_fit_beside_flexible_ones_that_imitat
     columns = {name: shapes[:, [i]] for i, name in enumerate("abcd")}
     columns |= {name: shapes + 0.01 * rng.normal(size=(80, 4)) for name in "efg"}
     offered: Any = {
-        name: SimpleNamespace(term=SimpleNamespace(components=(name,), parameters=(name,) * (column.shape[1] - 1)))
+        name: SimpleNamespace(
+            term=SimpleNamespace(variation=None, components=(name,), parameters=(name,) * (column.shape[1] - 1))
+        )
         for name, column in columns.items()
     }
     started: Any = set_screening._chosen(columns, target, (2,), 4, offered, lambda names: names)[2]

@@ -28,7 +28,7 @@ def left_by(amounts: Mapping[str, float]) -> Floats:
 
 def effect(name: str) -> Any:
     """An effect with a coefficient, and so many shape parameters as are its unknowns more than that."""
-    shape = SimpleNamespace(components=(name,), parameters=(name,) * (UNKNOWNS.get(name, 1) - 1))
+    shape = SimpleNamespace(variation=None, components=(name,), parameters=(name,) * (UNKNOWNS.get(name, 1) - 1))
     return SimpleNamespace(name=name, term=shape)
 
 
