@@ -163,6 +163,10 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     }  # fmt: skip
     most = 0.4 / source.dt
     bands = {name: (a, min(b, most)) for name, (a, b) in bands.items() if a < 0.8 * most}
+    expect(
+        bool(drivers) or prescribed or bool(record.forces),
+        f"{record.name}: a release of a structure is not planned; expected a record with a force, or of a single mass",
+    )
     based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
     deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table
     expect(

@@ -167,7 +167,12 @@ class Rivals:
 
 
 def rivals_of(rows: Sequence[Ranked], prepared: Prepared) -> Rivals:
-    """The rivals among rows that a record cannot tell apart."""
+    """The rivals among rows that a record cannot tell apart; a ``StudyError`` where no test of them can be planned."""
+    expect(
+        not rows[0].fit.model.modal,
+        f"{prepared.record.name}: the linear part of its model is a sum of modes, for which no test is planned; "
+        "expected a model with masses and springs",
+    )
     return Rivals(tuple(rows), prepared, present_test(prepared, rows[0].fit))
 
 

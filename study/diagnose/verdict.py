@@ -20,6 +20,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.set_search import SetSearch, by_power, searched
 from study.equations.linear_part import Modes, modes_of
+from study.equations.model import ModelTerm
 from study.equations.possible_effects import candidate_entries
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
@@ -110,13 +111,22 @@ def diagnose(
     if promise is None or not promise.alone:
         tried = candidates.try_all(entries, base, progress)
     if promise is not None and (promise.alone or promise.beside(tried)) and (suspect := promise.suspect()):
-        if suspect.comparison is not comparison or not tried:
-            comparison, base = suspect.comparison, search_base(suspect.comparison)
-            tried = candidates.try_all(entries, base, progress)
-        tried += varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
-        entries += suspect.entries
-    elif not tried:
-        tried = candidates.try_all(entries, base, progress)
+        laid_out, beside = (
+            suspect.comparison,
+            base if suspect.comparison is comparison else search_base(suspect.comparison),
+        )
+        with_changes = tried if tried and laid_out is comparison else candidates.try_all(entries, beside, progress)
+        with_changes = with_changes + varying_candidates.simplest(candidates.try_all(suspect.entries, beside, progress))
+        found = _diagnosis(laid_out, beside, with_changes, [*entries, *suspect.entries], progress)
+        if laid_out is comparison or any(e.term.variation for e in (found.answer.entries if found.answer else ())):
+            return found  # else nothing that is named changes, and the record is judged as it was
+    return _diagnosis(comparison, base, tried or candidates.try_all(entries, base, progress), entries, progress)
+
+
+def _diagnosis(
+    comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm],
+    progress: Progress | None,
+) -> Diagnosis:  # fmt: skip
     asked = len(entries) if base.several else len(tried)
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
     decision = _decide(rows, tried, base, comparison, asked, progress)
@@ -177,7 +187,8 @@ def _decide(
             return one
         # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
         fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
-    settled = [row for row in rows if not any(row.fit is c.fit for c in tried)]
+    changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
+    settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
     search = searched(base, tried, settled, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
