@@ -54,6 +54,7 @@ def test_the_authors_model_of_the_damper(run):
 
 
 @pytest.mark.long
+@needs("damper")
 @pytest.mark.parametrize("run", list(AUTHORS))
 def test_the_damper_is_hysteretic_before_it_is_any_polynomial(run):
     model, prepared = damper(run, "viscous_damper")
@@ -91,6 +92,7 @@ def test_the_pendulum_and_the_law_of_its_friction():
 
 
 @pytest.mark.long
+@needs("pendulum")
 def test_more_than_a_decay_is_asked_for_by_its_amplitude():
     """Dry friction and a dead band are a tie on this record: only a decay from further out could tell them apart."""
     model, prepared = pendulum()
