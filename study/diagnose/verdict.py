@@ -111,14 +111,13 @@ def diagnose(
     if promise is None or not promise.alone:
         tried = candidates.try_all(entries, base, progress)
     if promise is not None and (promise.alone or promise.beside(tried)) and (suspect := promise.suspect()):
-        laid_out, beside = (
-            suspect.comparison,
-            base if suspect.comparison is comparison else search_base(suspect.comparison),
-        )
-        with_changes = tried if tried and laid_out is comparison else candidates.try_all(entries, beside, progress)
-        with_changes = with_changes + varying_candidates.simplest(candidates.try_all(suspect.entries, beside, progress))
-        found = _diagnosis(laid_out, beside, with_changes, [*entries, *suspect.entries], progress)
-        if laid_out is comparison or any(e.term.variation for e in (found.answer.entries if found.answer else ())):
+        as_it_was = suspect.comparison is comparison
+        beside = base if as_it_was else search_base(suspect.comparison)
+        others = tried if tried and as_it_was else candidates.try_all(entries, beside, progress)
+        changes = varying_candidates.simplest(candidates.try_all(suspect.entries, beside, progress))
+        found = _diagnosis(suspect.comparison, beside, [*others, *changes], [*entries, *suspect.entries], progress)
+        named = () if found.answer is None else found.answer.entries
+        if as_it_was or any(entry.term.variation for entry in named):
             return found  # else nothing that is named changes, and the record is judged as it was
     return _diagnosis(comparison, base, tried or candidates.try_all(entries, base, progress), entries, progress)
 
