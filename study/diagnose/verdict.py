@@ -107,7 +107,7 @@ def diagnose(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
-    tried, promise = list[FittedCandidate](), varying_candidates.promise(comparison)
+    tried, promise, elsewhere = list[FittedCandidate](), varying_candidates.promise(comparison), 0
     if promise is None or not promise.alone:
         tried = candidates.try_all(entries, base, progress)
     if promise is not None and (promise.alone or promise.beside(tried)) and (suspect := promise.suspect()):
@@ -119,14 +119,17 @@ def diagnose(
         named = () if found.answer is None else found.answer.entries
         if as_it_was or any(entry.term.variation for entry in named):
             return found  # else nothing that is named changes, and the record is judged as it was
-    return _diagnosis(comparison, base, tried or candidates.try_all(entries, base, progress), entries, progress)
+        elsewhere = len(changes)
+    tried = tried or candidates.try_all(entries, base, progress)
+    return _diagnosis(comparison, base, tried, entries, progress, elsewhere)
 
 
 def _diagnosis(
     comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm],
-    progress: Progress | None,
+    progress: Progress | None, elsewhere: int = 0,
 ) -> Diagnosis:  # fmt: skip
-    asked = len(entries) if base.several else len(tried)
+    """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew."""
+    asked = (len(entries) if base.several else len(tried)) + elsewhere
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
     decision = _decide(rows, tried, base, comparison, asked, progress)
     families: list[FamilyGain] = []

@@ -20,10 +20,11 @@ ANCHOR = "part-two-"  # begins those of chapters
 def part_two_sentence(claims: pd.DataFrame) -> str:
     """How many claims of Part II hold."""
     whole, part, none = (int((claims["verdict"] == word).sum()) for word in HELD)
-    return (
-        f"**Part II, the report's recommendations followed: {whole} of {len(claims)} claims hold**, {part} partly, "
-        f"{none} do not."
-    )
+    tested = whole + part + none
+    said = f"{whole} of {tested} claims hold**, {part} partly, {none} not"
+    if tested < len(claims):
+        said += f"; {len(claims) - tested} more are not tested, as their data are not there"
+    return f"**Part II, the report's recommendations followed: {said}."
 
 
 def part_two_verdict(results: Results) -> list[Block]:

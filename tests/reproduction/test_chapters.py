@@ -174,8 +174,11 @@ def test_a_record_that_is_not_there_is_left_out_and_said_so(expected, monkeypatc
     assert all(name in sentence for name in ladders)
     assert "study data" in sentence
     judged = judged_claims("measured", made, expected)
-    assert set(judged["verdict"]) == {"does not hold"}
+    assert set(judged["verdict"]) == {"not tested"}
     assert judged["measured"].str.contains("left out").all()
+    said = whole_page.part_two_sentence(judged)
+    assert "0 of 0 claims hold" in said
+    assert f"{len(judged)} more are not tested" in said
 
 
 def test_ladders_name_records_and_terms_that_there_are(tmp_path):

@@ -1,7 +1,7 @@
 """What the chapters of Part II share: their settings, and from a chapter's tables to claims with a verdict each."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, cast
@@ -32,6 +32,7 @@ from study.support.thresholds import ALPHA
 Tables = Mapping[str, pd.DataFrame]  # by their names in ``Contents.tables``
 Judge = Callable[[Tables, Reported], Iterable[Condition]]
 HELD = ("holds", "partly", "does not hold")
+NOT_TESTED, LEFT_OUT = "not tested", "left out, as the data are not there"
 
 
 class NoiseSettings(Ensembles):
@@ -142,11 +143,15 @@ def get_chapter(name: str) -> Chapter:
 
 
 def judged_claims(chapter: str, tables: Tables, expected: Reported) -> pd.DataFrame:
-    """Every claim of a chapter with its conditions, what was measured and the verdict, a row each."""
+    """Every claim of a chapter with its conditions, what was measured and the verdict, a row each.
+
+    One without any condition is not tested: the data that it is about are not there.
+    """
     claims = [
         conclude(expected, name, *judge(tables, expected), words=HELD)
         for name, judge in get_chapter(chapter).claims.items()
     ]
+    claims = [c if c.criterion else replace(c, verdict=NOT_TESTED, measured=LEFT_OUT) for c in claims]
     return pd.DataFrame([{"chapter": chapter, **asdict(claim)} for claim in claims])
 
 

