@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from study.figures import page
+from study.figures.labels import term_names
 from study.reproduction.chapters.chapter import Chapter, Tables, judges
 from study.reproduction.claims.judgement import Condition
 from study.reproduction.claims.reported import Reported
@@ -65,7 +66,7 @@ def measured_steps(tables: Tables, _: Reported) -> Iterator[Condition]:
     for record, rows in _there(tables).groupby("record", sort=False):
         errors = rows["error"].tolist()
         steps = zip(rows["added"].tolist()[1:], errors[1:], errors, strict=False)
-        worse = [f"{added.replace('_', ' ')} {percent(after)}" for added, after, before in steps if not after < before]
+        worse = [f"{term_names(added)} {percent(after)}" for added, after, before in steps if not after < before]
         yield Condition(
             f"{record}: every term that is added lowers the held-out error",
             f"{record}: {' to '.join(percent(e) for e in errors)}" + (f", not {enumerated(worse)}" if worse else ""),
@@ -97,7 +98,7 @@ def ladders_figure(tables: Tables) -> Figure:
     )  # fmt: skip
     for panel, record in zip(axes, records, strict=False):
         own = rows[rows["record"] == record]
-        labels = ["as given", *(f"+ {added.replace('_', ' ')}" for added in own["added"].tolist()[1:])]
+        labels = ["as given", *(f"+ {term_names(added)}" for added in own["added"].tolist()[1:])]
         panel.plot(range(len(own)), 100.0 * own["error"], "o-", color="C0", markersize=5.0, linewidth=1.4)
         panel.plot(range(len(own)), 100.0 * own["floor"], color="black", linewidth=1.0, linestyle=(0, (5.0, 2.0)))
         panel.set_yscale("log")
@@ -121,7 +122,7 @@ def ladders_figure(tables: Tables) -> Figure:
 def told_measured(tables: Tables) -> list[Block]:
     """Every ladder beside what the literature reaches."""
     rows = [
-        [str(r["record"]).replace("_", " "), f"+ {str(r['added']).replace('_', ' ')}" if r["step"] else "as given",
+        [str(r["record"]).replace("_", " "), f"+ {term_names(str(r['added']))}" if r["step"] else "as given",
          percent(r["error"]), f"{r['rms']:.3g} {r['unit']}", percent(r["floor"]),
          str(r["published"]) if not r["step"] else ""]
         for _, r in _there(tables).iterrows()

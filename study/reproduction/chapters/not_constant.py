@@ -212,7 +212,7 @@ def not_constant_figure(tables: Tables) -> Figure:
                      edgecolor="white", label=f"{which} coefficients")  # fmt: skip
     axes[0].set_yticks(range(len(titles)), titles)
     axes[0].set_xlabel("left by a free run (% of the rms)")
-    figure.subplots_adjust(left=0.2, wspace=0.22)
+    figure.subplots_adjust(left=0.22, wspace=0.22)
     t = tables["moments"]
     axes[1].plot(
         t["moment"], t["cost"] / t["cost"].min(), ".-", color="C0", linewidth=1.2, label="step tried at a moment"

@@ -21,6 +21,7 @@ from study.equations.model import Model, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.figures import page
+from study.figures.labels import term_names
 from study.identify.estimators.base import Settings
 from study.identify.estimators.in_free_run import free_run_fit
 from study.identify.estimators.in_reverse import miso
@@ -167,8 +168,8 @@ def forces_coherence_wrong(tables: Tables, expected: Reported) -> Iterator[Condi
     limit = expected.limit("forces_coherence")
     for row in _by_case(tables, WRONG):
         yield Condition(
-            f"{row['title']} as {_plain(row['terms'])}: mean multiple coherence below {limit:g}",
-            f"{row['title']} as {_plain(row['terms'])}: {row['coherence']:.4f}", bool(row["coherence"] < limit),
+            f"{row['title']} as {_in_words(row['terms'])}: mean multiple coherence below {limit:g}",
+            f"{row['title']} as {_in_words(row['terms'])}: {row['coherence']:.4f}", bool(row["coherence"] < limit),
             because="what is missing is a small part of the force, most of which mass, damper and spring explain",
         )  # fmt: skip
 
@@ -178,8 +179,8 @@ def forces_change(tables: Tables, expected: Reported) -> Iterator[Condition]:
     limit = expected.value("forces_change.change")
     for row in _by_case(tables, WRONG):
         yield Condition(
-            f"{row['title']} as {_plain(row['terms'])}: a coefficient changes by more than {percent(limit)}",
-            f"{row['title']} as {_plain(row['terms'])}: {row['changes']} by {percent(row['change'], '.2g')}",
+            f"{row['title']} as {_in_words(row['terms'])}: a coefficient changes by more than {percent(limit)}",
+            f"{row['title']} as {_in_words(row['terms'])}: {row['changes']} by {percent(row['change'], '.2g')}",
             bool(row["change"] > limit),
             because="a force in proportion to |v| scales with the motion, so that nothing changes with the level",
         )
@@ -201,15 +202,15 @@ def forces_left(tables: Tables, expected: Reported) -> Iterator[Condition]:
     times, right = expected.value("forces_left.times"), {r["case"]: r["left"] for r in _by_case(tables, RIGHT)}
     for row in _by_case(tables, WRONG):
         yield Condition(
-            f"{row['title']} as {_plain(row['terms'])}: left more than {times:g} times what the right model leaves",
-            f"{row['title']} as {_plain(row['terms'])}: {percent(row['left'])} where the right model leaves "
+            f"{row['title']} as {_in_words(row['terms'])}: left more than {times:g} times what the right model leaves",
+            f"{row['title']} as {_in_words(row['terms'])}: {percent(row['left'])} where the right model leaves "
             f"{percent(right[row['case']])}", bool(row["left"] > times * right[row["case"]]),
             because="two laws of friction differ near rest alone, a small part of the time",
         )  # fmt: skip
 
 
-def _plain(terms: str) -> str:
-    return terms.replace(" ", " and ").replace("_", " ")
+def _in_words(terms: str) -> str:
+    return term_names(terms.replace(" ", " and "))
 
 
 # ---- figures and words
@@ -259,7 +260,7 @@ def force_coherences(tables: Tables) -> Figure:
             )
         panel.set_ylim(0.85, 1.003)
         panel.set_xlabel("frequency (Hz)")
-        words = _plain(wrong[case["case"]]["terms"]).replace("van der pol", "Van der Pol").replace(" and ", "\nand ")
+        words = _in_words(wrong[case["case"]]["terms"]).replace(" and ", "\nand ")
         panel.text(0.97, 0.06, f"wrong: {words}", transform=panel.transAxes, ha="right", fontsize=7.0)
     for panel in axes[::4]:
         panel.set_ylabel("coherence")
@@ -274,7 +275,7 @@ def told_forces(tables: Tables) -> list[Block]:
     rows: list[list[str]] = []
     for right in _by_case(tables, RIGHT):
         other = wrong[right["case"]]
-        for row, model in ((right, "its own"), (other, _plain(other["terms"]))):
+        for row, model in ((right, "its own"), (other, _in_words(other["terms"]))):
             change = f"{percent(row['change'], '.2g')} ({row['changes']})"
             rows.append([
                 str(row["title"]), model, f"{row['coherence']:.4f}", f"{row['lowest']:.3f}", percent(row["left"]),
