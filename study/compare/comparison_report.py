@@ -271,7 +271,7 @@ def _joined(parts: Sequence[tuple[str, Columns]]) -> bytes:
 
 def _named(what: str, name: str, table: Columns) -> Columns:
     """A table with a column before the others that says the same in each row."""
-    return {what: [name] * len(next(iter(table.values()), [])), **table}
+    return {what: [name] * len(next(iter(table.values()), list[Any]())), **table}
 
 
 def _csv(table: Columns) -> bytes:

@@ -27,7 +27,7 @@ def filled(columns: Mapping[str, Any]) -> Columns:
 def one_below_the_other(tables: Sequence[Columns]) -> Columns:
     """Several tables as one, with the columns of all; what a table lacks is None."""
     headings = dict.fromkeys(heading for table in tables for heading in table)
-    sizes = [len(next(iter(table.values()), [])) for table in tables]
+    sizes = [len(next(iter(table.values()), list[Any]())) for table in tables]
     return {
         heading: [cell for table, size in zip(tables, sizes, strict=True) for cell in table.get(heading, [None] * size)]
         for heading in headings
