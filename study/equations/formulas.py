@@ -14,7 +14,6 @@ from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
 CHARACTERS = 300  # at most
-FORMULAS = 1024  # that are remembered: an analysis asks for the same few thousands of times
 DEEPEST = 40
 ONE_AT_A_TIME = Lock()  # Python before 3.13 counts the depth of a tree that it makes for all threads together
 LARGEST_EXPONENT = 16.0
@@ -31,7 +30,7 @@ class ExpressionError(StudyError):
     """A formula that is not of the whitelisted kind."""
 
 
-@lru_cache(maxsize=FORMULAS)
+@lru_cache(maxsize=1024)
 def parse(text: str) -> ast.expr:
     """Check the outer form of a formula and return its syntax tree, which is not to be changed."""
     if len(text) > CHARACTERS:
@@ -52,7 +51,7 @@ def parse(text: str) -> ast.expr:
     return tree
 
 
-@lru_cache(maxsize=FORMULAS)
+@lru_cache(maxsize=1024)
 def names(text: str) -> tuple[str, ...]:
     """The names a formula uses, functions and pi aside, in alphabetical order."""
     tree = parse(text)
