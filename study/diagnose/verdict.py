@@ -13,7 +13,7 @@ from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.diagnose import candidates, set_search, varying_candidates
-from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
+from study.diagnose.candidates import FittedCandidate, Progress, unknowns_of, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
 from study.diagnose.ranked import Ranked
@@ -131,7 +131,7 @@ def _diagnosis(
     """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew."""
     asked = (len(entries) if base.several else len(tried)) + elsewhere
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    decision = _decide(rows, tried, base, comparison, asked, progress)
+    decision = _decide(rows, tried, entries, base, comparison, asked, progress)
     families: list[FamilyGain] = []
     if decision.verdict == UNKNOWN:
         families = dependence.families(dependence.unexplained(base))
@@ -174,8 +174,8 @@ class _Decision:
 
 
 def _decide(
-    rows: list[Ranked], tried: Sequence[FittedCandidate], base: Baseline, comparison: Comparison, asked: int,
-    progress: Progress | None,
+    rows: list[Ranked], tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm], base: Baseline,
+    comparison: Comparison, asked: int, progress: Progress | None,
 ) -> _Decision:  # fmt: skip
     """One effect that explains everything; else the set that does, as far as the record bears it."""
     prediction, own = comparison.prediction, held_out_of(comparison)
@@ -191,7 +191,12 @@ def _decide(
         fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
     changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
-    search = searched(base, tried, settled, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
+    known = {c.name for c in tried}
+    # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
+    not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
+    search = searched(
+        base, tried, settled, not_alone, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress
+    )
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
@@ -326,4 +331,7 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     """
     nameless = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
     left = dependence.left_by(fit, prediction.prepared)
-    return prediction.error * float(np.sqrt(dependence.significant_share(left, nameless)))
+    of_motion = prediction.error * float(np.sqrt(dependence.significant_share(left, nameless)))
+    # shapes tell little in a decay's few loud blocks, or where nothing brings a motion back: there what stands above
+    # white noise counts, as no force is there whose noise the motion could have coloured, or not for long
+    return max(of_motion, prediction.above_noise) if prediction.prepared.record.stretches else of_motion
