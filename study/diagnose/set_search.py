@@ -88,9 +88,9 @@ def searched(
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
     ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley,
-    ``not_alone`` simple ones beside which alone no motion stays finite. ``done`` says whether a set leaves nothing to be explained;
-    ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple effects with fewer
-    are asked for.
+    ``not_alone`` simple ones beside which alone no motion stays finite. ``done`` says whether a set leaves nothing to
+    be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple
+    effects with fewer are asked for.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
     offered |= {entry.name: entry for entry in not_alone}

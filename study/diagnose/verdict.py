@@ -194,9 +194,7 @@ def _decide(
     known = {c.name for c in tried}
     # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
     not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
-    search = searched(
-        base, tried, settled, not_alone, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress
-    )
+    search = searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
@@ -322,6 +320,12 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     """
     alone = prepared.response == FORCE or prepared.free
     return alone and first.gain.explained > MOST and not first.unphysical
+
+
+def _leaves_nothing(candidate: FittedCandidate) -> bool:
+    """Whether nothing is left for a further effect: shapes of the motion see nothing, noise alone leaves as much."""
+    prediction = candidate.prediction
+    return prediction.above_noise <= TOLERANCE and _left(candidate.fit, prediction) <= TOLERANCE
 
 
 def _left(fit: FreeRunFit, prediction: Prediction) -> float:
