@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from study.compare import dependence
-from study.compare.comparison import Comparison
+from study.compare.comparison import Comparison, compare
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
@@ -29,9 +29,10 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
 from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
-from study.support.errors import DivergenceError
+from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
 MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
@@ -121,6 +122,8 @@ def diagnose(
             return found  # else nothing that is named changes, and the record is judged as it was
         elsewhere = len(changes)
     tried = tried or candidates.try_all(entries, base, progress)
+    if (freed := _freed(comparison, base, tried)) is not None:
+        return diagnose(freed, extra=extra, without=without, progress=progress)
     return _diagnosis(comparison, base, tried, entries, progress, elsewhere)
 
 
@@ -140,6 +143,25 @@ def _diagnosis(
     return Diagnosis(
         decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
     )
+
+
+def _freed(comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate]) -> Comparison | None:
+    """The comparison with the deeper minimum that the model itself has where its best candidate ended; None if none is.
+
+    An effect that only freed the fit of the model from a side valley is not missing.
+    """
+    best = min(tried, key=lambda c: c.fit.rms, default=None)
+    if best is None or comparison.model.modal or comparison.fit.restarts or not base.fit.keys:
+        return None
+    values = dict(zip(best.fit.keys, best.fit.values.tolist(), strict=True))
+    try:
+        fit = fit_part(base.fit.model, base.prepared, base.fit.held, values, steps=base.fit.steps_per_sample)
+        if base.fit.rms - fit.rms <= TOLERANCE * base.prepared.spread:
+            return None
+        freed = compare(comparison.model, comparison.prepared, fit=finished(fit, comparison.prepared))
+    except StudyError:
+        return None
+    return freed if freed.fit.rms < comparison.fit.rms else None
 
 
 def search_part(prepared: Prepared) -> Prepared:
