@@ -70,9 +70,13 @@ class SetSearch:
         """The set without one of its effects, fitted if it was not."""
         fewer = names - {name}
         if fewer and fewer not in self.tried:
-            whole = self.tried[names]
-            self.fit([SetStart(fewer, whole.fit.model.without_term(name), whole)])
+            self.fit([start_without(self.tried[names], name)])
         return self.tried.get(fewer)
+
+
+def start_without(whole: FittedCandidate, name: str) -> SetStart:
+    """A set without one of its effects, begun where the fit of all ended."""
+    return SetStart(frozenset(whole.names) - {name}, whole.fit.model.without_term(name), whole)
 
 
 def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
@@ -127,9 +131,12 @@ def searched(
         best = larger if gained else best
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
-    for names in [frozenset(c.names) for size in sizes for c in search.sets(size)[:2]]:
-        for name in names:
-            search.without(names, name)
+    for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
+        search.fit(
+            [start_without(best, name) for name in best.names]
+        )  # beside others an effect may leave a side valley
+        for name in (n for c in others for n in c.names):
+            search.without(frozenset(others[0].names), name)
     return search
 
 

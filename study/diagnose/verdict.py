@@ -217,6 +217,10 @@ def _decide(
     # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
     not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
     search = searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
+    deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
+    if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
+        rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)
+        return _decide(rows, deeper, entries, base, comparison, asked, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
