@@ -87,7 +87,8 @@ class Bench:
         return searched(base, singles, [], not_alone, lambda _: done, fewer_than)
 
     def sizes(self) -> set[int]:
-        return {len(names) for names, _ in self.fitted}
+        """Of the sets of several effects."""
+        return {len(names) for names, _ in self.fitted if len(names) > 1}
 
 
 def hidden(names: str) -> Leaves:
@@ -124,6 +125,20 @@ def test_one_size_may_gain_nothing_but_not_two(monkeypatch: pytest.MonkeyPatch):
 
 def test_an_effect_beside_which_alone_no_motion_is_finite_is_asked_for_in_sets(monkeypatch: pytest.MonkeyPatch):
     assert best(Bench(monkeypatch, hidden("abd")).search(lost="b"), 3) == "abd"
+
+
+def test_an_effect_alone_is_fitted_again_from_where_a_set_with_it_ended(monkeypatch: pytest.MonkeyPatch):
+    """Its first fit ended in a side valley, which another effect beside it led out of."""
+
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        return {"b": 1.0, "c": 0.5} if found == {"a"} else {} if "a" in found else {"a": 1.0}
+
+    bench = Bench(monkeypatch, leaves)
+    monkeypatch.setattr(
+        bench, "fit", lambda start: candidate(start.names, {} if "a" in start.names else leaves(start.names))
+    )
+    search = bench.search()
+    assert search.tried[frozenset("a")].power < 0.7 * candidate("a", leaves(frozenset("a"))).power
 
 
 def test_exchanges_go_on_until_none_gains(monkeypatch: pytest.MonkeyPatch):
