@@ -153,7 +153,8 @@ def _freed(comparison: Comparison, base: Baseline, tried: Sequence[FittedCandida
     best = min(tried, key=lambda c: c.fit.rms, default=None)
     if best is None or comparison.model.modal or comparison.fit.restarts or not base.fit.keys:
         return None
-    values = dict(zip(best.fit.keys, best.fit.values.tolist(), strict=True))
+    ended = dict(zip(best.fit.keys, best.fit.values.tolist(), strict=True))
+    values = {key: ended[key] for key in base.fit.keys if key in ended}
     try:
         fit = fit_part(base.fit.model, base.prepared, base.fit.held, values, steps=base.fit.steps_per_sample)
         if base.fit.rms - fit.rms <= TOLERANCE * base.prepared.spread:
