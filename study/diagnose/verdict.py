@@ -288,8 +288,12 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
 def _material(
     answer: Ranked, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
 ) -> tuple[Ranked, float]:
-    """The set without effects that explain less than what is left beside all: they imitate a part of that."""
-    ranked = {frozenset(r.names): r for r in sets}
+    """The set without effects that explain less than what is left beside all: they imitate a part of that.
+
+    Without those as well that explain no more than models of real structures leave, and next to nothing of what is
+    unexplained: the others are missing, whatever is missing besides.
+    """
+    ranked, unexplained = {frozenset(r.names): r for r in sets}, comparison.prediction.error
     left = _left(answer.fit, answer.prediction)
     while len(answer.entries) > 1:
         names = frozenset(answer.names)
@@ -297,12 +301,16 @@ def _material(
         least = min(smaller, key=lambda c: c.prediction.error, default=None)
         if least is None:
             break
-        explains = math.sqrt(max(least.prediction.error**2 - answer.prediction.error**2, 0.0))
+        whole = search.tried.get(names, answer)  # fitted on as much of the record
+        explains = math.sqrt(max(least.prediction.error**2 - whole.prediction.error**2, 0.0))
+        little = explains <= GOOD and explains**2 <= (1.0 - ENOUGH) * unexplained**2
         # shapes of the motion do not see all that a model leaves: what stands above white noise counts as well
-        if explains >= max(left, answer.prediction.above_noise):
+        if explains >= max(left, answer.prediction.above_noise) and not little:
             break
         fewer = ranked.get(frozenset(least.names))
-        answer = fewer if fewer is not None else rank([least], comparison, len(search.tried))[0]
+        if fewer is None:
+            fewer = rank(with_best_settled([least], comparison.prepared), comparison, len(search.tried))[0]
+        answer = fewer
         left = _left(answer.fit, answer.prediction)
     return answer, left
 
