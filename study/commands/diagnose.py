@@ -99,7 +99,9 @@ def diagnosed_together(
     with progress(" fits", name=name) as step:
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        found = diagnose_accounted(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
+        found = diagnose_accounted(
+            accounted, extra=own, without=without, progress=lambda _, total, what: step(f"{name}, {what}", total)
+        )
     return found, separate
 
 
