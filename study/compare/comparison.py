@@ -18,6 +18,7 @@ from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
 from study.compare.prediction import Prediction, SensorPrediction, predict
+from study.compare.unlike_records import unlike_in_words, unlike_records
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import LINEAR, Modes, is_positive, modes_of
@@ -197,7 +198,8 @@ def compare(
     judged = _judged(
         fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
     )
-    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit)]
+    unlike = unlike_in_words(unlike_records(fit, prepared), fit.model, prepared.record)
+    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit), unlike]
     return Comparison(
         model=model, prepared=prepared, fit=fit, found=found, notes=(*prepared.notes, *filter(None, said)),
         estimator=estimator, **judged,

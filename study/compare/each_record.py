@@ -17,13 +17,13 @@ from tabulate import tabulate
 
 from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import MOVES, RESOLUTION, Level
+from study.compare.unlike_records import CHANNEL
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import Component, Term
 from study.records.record import Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
-CHANNEL = "along_record_{}"  # one along this record and zero along the others
 SLOPES = {"u": "1", "u**3": "3*u**2", "u*abs(u)": "2*abs(u)"}  # d/du of the shapes that the library differentiates
 
 
