@@ -132,7 +132,7 @@ def _diagnosed(
     levels = levels_by_record(comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
-    if model.named:
+    if model.named and not model.prescribed:
         print("\n" + modes_before_and_after(diagnosis))
     print("\n" + words)
     if faults:

@@ -11,6 +11,7 @@ from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.compare.varying_coefficients import varying_in_words
 from study.equations.place import place_in_words
+from study.records.record import FORCE
 from study.support.numbers import by_chance, percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
@@ -101,7 +102,9 @@ def _of_equations(comparison: Comparison) -> list[str]:
     """Which equation of a structure is violated most, and where a force would explain most of it."""
     missing, said = comparison.missing, list[str]()
     if missing.lacking:
-        said.append(f"the reverse system says no force of {', '.join(missing.lacking)}, which no sensor shows")
+        lacking, shown = ", ".join(missing.lacking), comparison.prepared.response != FORCE
+        why = "which no sensor shows" if shown else "where none was measured"
+        said.append(f"the reverse system says no force of {lacking}, {why}")
     if np.any(missing.rms > 0.0):
         i = int(np.argmax(missing.rms))
         name = missing.equations[i]

@@ -44,7 +44,7 @@ class DynamicStiffness:
 def highest_frequency(comparison: Comparison) -> float:
     """Where pictures of spectra end, in hertz: above the modes, below half of the sampling frequency."""
     half = 0.5 / comparison.prepared.dt
-    fastest = HIGHEST * float(np.max(comparison.modes.frequency))
+    fastest = HIGHEST * float(np.max(comparison.modes.frequency, initial=0.0))
     return min(half, fastest) if fastest > 0.0 else half
 
 

@@ -36,7 +36,8 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
             sets = [("as given", comparison.modes)]
             sets += [("with what is missing", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
             drawn["structure"] = structure_figure(comparison, sketch_of_diagnosis(diagnosis))
-            drawn["modes"] = modes(comparison, sets)
+            if not comparison.model.prescribed:
+                drawn["modes"] = modes(comparison, sets)
         return page.image_files(drawn)
 
 

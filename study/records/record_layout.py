@@ -249,7 +249,7 @@ def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int, *, a
 
 def period_of(stretch: Stretch, sensors: Sequence[Sensor]) -> float:
     """Samples in a period of the slowest motion; of the displacement where that is prescribed."""
-    seen = [MOTIONS[0] if s.motion == FORCE else s for s in sensors]
+    seen = [Sensor(s.coordinate, MOTIONS[0]) if s.motion == FORCE else s for s in sensors]
     return max(period(stretch.source[s][stretch.first : stretch.last]) for s in seen)
 
 

@@ -17,10 +17,10 @@ from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
-from study.records.driven_by_motion import on_a_moving_base, relative_to_base
+from study.records.driven_by_motion import on_a_moving_base, relative_to_base, with_forces_by_coordinate
 from study.records.prepared import Prepared
 from study.records.readers.remarks import LEAVING_OUT
-from study.records.record import Record
+from study.records.record import FORCE, Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 from study.records.sampling_rate import low_passed
 from study.support.errors import expect
@@ -54,11 +54,12 @@ def made_ready(
     if layout.highest is not None:
         below = [low_passed(record, layout.highest) for record in records]
         records, said = [record for record, _ in below], (*said, below[0][1])
-    prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
-    drifts = not (prescribed or model.modal or has_spring(model))
+    if model.prescribed and model.named:
+        records = [with_forces_by_coordinate(record, model.forces) for record in records]
+    drifts = not (model.prescribed or model.modal or has_spring(model))
     anew = ANEW if len(model.coordinates) > 1 else 0.0
     varies = any(entry.term.variation for entry in model.terms)  # along all of the record
-    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew, varies))
+    prepared = laid_out(records, layout, KindOfTest(model.prescribed, drifts, model.modal is not None, anew, varies))
     model = with_laid_variations(model, prepared)
     lacks = _unseen(model, prepared)
     noticed = [f"{r.name}: {remark}" if len(records) > 1 else remark for r in records for remark in r.remarks
@@ -77,7 +78,7 @@ def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
     """
     if not model.named:
         return ()
-    if not model.modal:  # whose masses nobody lumps
+    if model.inertial:  # modes are nobody's lumped masses, and a component has none
         check_held_masses(model)
     blind = [coordinate for coordinate in model.coordinates if coordinate not in prepared.coordinates]
     for name in blind:
@@ -87,6 +88,8 @@ def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
             "a term between it and a coordinate that is measured",
         )
     lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
+    if prepared.response == FORCE:
+        lacks = f"no force was measured at {' and '.join(blind)}: those of the others alone are compared"
     return (lacks,) if blind else ()
 
 
@@ -156,7 +159,7 @@ def compare_records(
         )  # fmt: skip
 
     found = found_in(prepared)
-    if runs_on(prepared):
+    if runs_on(prepared) and (model.states or not model.prescribed):  # what has no state loses no motion
         anew = apart(prepared)
         while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
             found = found_in(shorter)

@@ -102,7 +102,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     short = unknown and not (model.named or changes)  # a short stretch tells of no change along a long one
     look = shape_search.searched_stretch(known, prepared) if short else prepared
-    fit = first_fit(known, look) if model.named else _from_nothing(known, look)
+    placed = model.named and prepared.response != FORCE
+    fit = first_fit(known, look) if placed else _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)
     in_order = tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms)
@@ -215,7 +216,8 @@ def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) ->
     if fit.model.modal:
         return _beside_modes(base, entry, points)
     grown, points = fit.model.with_term(entry), points or shape_search.shape_starts(entry, base)
-    starts = (_from_the_equations if base.several else _from_the_free_run)(entry, base, points)
+    in_reverse = base.several and not base.prescribed
+    starts = (_from_the_equations if in_reverse else _from_the_free_run)(entry, base, points)
     initial = grown_states(fit, grown) if base.several else None  # which no sensor may show
     try:
         best = best_fit(grown, prepared, [start | given for start in starts], (*fit.held, *given), initial)
