@@ -66,13 +66,8 @@ def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Recor
     from study.equations import terms
     from study.equations.model_file import read_model
     from study.faults.fault import settings_beside
-    from study.support.errors import expect
 
     model = read_model(arguments.model)
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
-    )
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)

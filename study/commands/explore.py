@@ -55,12 +55,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     from study.explore import session as sessions
     from study.explore.by_record import Several, by_record, of_own
     from study.faults.accounting import Accounted
-    from study.support.errors import expect
 
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a session",
-    )
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate

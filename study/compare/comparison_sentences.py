@@ -110,8 +110,8 @@ def _of_equations(comparison: Comparison) -> list[str]:
         name = missing.equations[i]
         left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms are left of its forces"
         said.append(f"the equation of {name} is violated most: {left}")
-    if len(comparison.views) > 1:
-        place, share = missing.aligned[0]
+    place, share = missing.aligned[0]
+    if len(comparison.views) > 1 and share > 0.0:
         said.append(
             f"a single force {place_in_words(place)} could make {percent(share)} of what stands above the noise"
         )

@@ -50,6 +50,11 @@ def made_ready(
         If the records, or the model and such a test, do not go together; of a structure, if nothing measures a
         coordinate or ties it to another, or its masses are not positive definite together.
     """
+    one_mass = len(model.coordinates) == 1 and not (model.modal or model.prescribed)
+    expect(
+        layout.near is None or one_mass,
+        "--near is the mode that a single mass is fitted to; expected --up-to, or all modes, of anything else",
+    )
     model, records, said = driven_alike(records, model, absolute)
     if layout.highest is not None:
         below = [low_passed(record, layout.highest) for record in records]

@@ -17,7 +17,7 @@ from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.subspace import observability
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
-from study.support.arrays import Complexes, Floats
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import Point, minimise, point_at
@@ -45,6 +45,8 @@ class DrivenLines:
         Sensors in shares of their size, as displacements times ``order``.
     order : complex array, shape (lines, sensors)
         ``s^r / size`` of each sensor's motion.
+    stretch : int array, shape (lines,)
+        Of which stretch each is.
     """
 
     s: Complexes
@@ -52,41 +54,45 @@ class DrivenLines:
     unit: Complexes
     outputs: Complexes
     order: Complexes
+    stretch: Ints
 
 
 def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
-    """Lines of the fitting part, through a Hann window.
+    """Lines of the fitting part, through a Hann window; of several stretches those of each, one after the other.
 
     Raises
     ------
     StudyError
         If no force drives the structure, or a term's place has no sensor.
     """
-    first, last = prepared.plan.fit
-    taper = np.hanning(last - first + 1)[:-1]
-    names = [name for name, _ in model.forces]
-    lines = (last - first) // 2
-    omega = 2.0 * np.pi * np.arange(1, lines) / ((last - first) * prepared.dt)
-
-    def spectrum(values: Floats) -> Complexes:
-        part = values[first:last]
-        return np.asarray(rfft((part - np.mean(part)) * taper)[1:lines], dtype=np.complex128)
-
-    forces = np.stack([spectrum(prepared.record[n]) for n in names], axis=1)
-    power = np.sum(np.abs(forces) ** 2, axis=1)
-    smooth = np.convolve(power, np.ones(9) / 9.0, "same")
-    driven = np.flatnonzero(smooth > FAINT * float(np.max(smooth)))
-    expect(len(driven) > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {len(driven)} lines; expected more")
-    keep = driven[:: max(1, len(driven) // LINES)]
     blind = [c for t in model.terms for c in t.place.moving if c not in prepared.coordinates]
     expect(not blind, f"no sensor is at {', '.join(blind)}; expected terms of a modal model between sensors")
     motion = np.stack([prepared.record.motion(c) for c in model.coordinates], axis=2)
-    unit = [spectrum(x)[keep] for x in unit_forces(model, prepared.record, motion)]
-    s = (1j * omega[keep]).astype(np.complex128)
+    forces = prepared.record.columns([name for name, _ in model.forces])
+    unit = np.array(unit_forces(model, prepared.record, motion)).reshape(-1, len(forces)).T
+    channels = np.hstack([forces, unit, prepared.measured])
+    ends = forces.shape[1], forces.shape[1] + unit.shape[1]
+    spectra, frequency = list[Complexes](), list[Floats]()
+    for first, last in prepared.record.runs(prepared.plan.fit):
+        n, part = last - first, channels[first:last]
+        taper = np.hanning(n + 1)[:-1, None]
+        spectra.append(np.asarray(rfft((part - np.mean(part, axis=0)) * taper, axis=0)[1 : n // 2], np.complex128))
+        frequency.append(np.arange(1, n // 2) / (n * prepared.dt))
+    powers = [np.sum(np.abs(lines[:, : ends[0]]) ** 2, axis=1) / len(lines) for lines in spectra]
+    smooth = [np.convolve(power, np.ones(9) / 9.0, "same") for power in powers]
+    strongest = max(float(np.max(power)) for power in smooth)
+    driven = [np.flatnonzero(power > FAINT * strongest) for power in smooth]
+    count = sum(map(len, driven))
+    expect(count > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {count} lines; expected more")
+    kept = [lines[:: max(1, count // LINES)] for lines in driven]
+    found = np.concatenate([lines[keep] for lines, keep in zip(spectra, kept, strict=True)])
+    s = 2j * np.pi * np.concatenate([f[keep] for f, keep in zip(frequency, kept, strict=True)])
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
-    outputs = np.stack([spectrum(x)[keep] for x in prepared.measured.T], axis=1) / prepared.scale
-    columns = np.stack(unit, axis=1) if unit else np.zeros((len(keep), 0), dtype=np.complex128)
-    return DrivenLines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
+    shown = found[:, ends[1] :] / prepared.scale
+    return DrivenLines(
+        s.astype(np.complex128), found[:, : ends[0]], found[:, ends[0] : ends[1]], shown.astype(np.complex128),
+        order.astype(np.complex128), np.repeat(np.arange(len(kept)), [len(keep) for keep in kept]),
+    )  # fmt: skip
 
 
 def unit_forces(model: Model, record: Record, motion: Floats) -> list[Floats]:
@@ -204,7 +210,8 @@ def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[Li
     at = np.array([[float(c == s) for s in sensors] for c in points])
     drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
     inputs = np.concatenate([lines.forces, lines.unit], axis=1)
-    space = observability(lines.s.imag, inputs, lines.outputs / lines.order * np.abs(lines.order), BLOCKS)
+    shown = lines.outputs / lines.order * np.abs(lines.order)
+    space = observability(lines.s.imag, inputs, shown, BLOCKS, lines.stretch)
     power = float(np.sum(np.abs(lines.outputs) ** 2))
     for modes in range(1, most + 1):
         modal = ModalPart(points).of(modes)

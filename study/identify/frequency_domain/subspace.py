@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.support.arrays import Complexes, Floats
+from study.support.arrays import Complexes, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Observability:
         return np.asarray(-np.abs(s.real) + 1j * s.imag, dtype=np.complex128)
 
 
-def observability(omega: Floats, inputs: Complexes, outputs: Complexes, blocks: int) -> Observability:
+def observability(omega: Floats, inputs: Complexes, outputs: Complexes, blocks: int, stretch: Ints) -> Observability:
     """The extended observability matrix's column space.
 
     Parameters
@@ -42,10 +42,12 @@ def observability(omega: Floats, inputs: Complexes, outputs: Complexes, blocks: 
         Spectra; each output is scaled to unit power.
     blocks : int
         Block rows: more than the order of the system.
+    stretch : int array, shape (lines,)
+        Of which stretch each line is: one that is cut has a transient of its own.
     """
-    period = 2.0 / float(np.sqrt(omega[0] * omega[-1]))
+    period = 2.0 / float(np.sqrt(np.min(omega) * np.max(omega)))
     turn = np.exp(2j * np.arctan(omega * period / 2.0))
-    transient = np.ones((len(omega), 1)) * np.sqrt(np.mean(np.abs(inputs[:, :1]) ** 2))  # of a record that is cut
+    transient = (stretch[:, None] == np.unique(stretch)) * np.sqrt(np.mean(np.abs(inputs[:, :1]) ** 2))
     driven = _unit(np.concatenate([inputs, transient * turn[:, None]], axis=1))
     rows = [_stack(driven, turn, blocks), _stack(_unit(outputs), turn, blocks)]
     data = np.concatenate(rows)
