@@ -25,7 +25,7 @@ SHARED_CALLS = {
     "simulate": ("equations/", "interface/"),
 }
 # A panel of the page is called after what it draws.
-PANELS = {"explore/plots.py", "explore/check_plots.py"}
+PANELS = {"explore/plots.py"}
 
 
 def imported(path: Path) -> set[str]:

@@ -53,7 +53,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     """The session with the model as given, on one record or fitted to several together and to each by itself."""
     from study.compare.comparison import STEPS
     from study.explore import session as sessions
-    from study.explore.by_record import Several, by_record, of_own
+    from study.explore.session import Several, by_record, of_own
     from study.faults.accounting import Accounted
 
     records = read_records(arguments, model)

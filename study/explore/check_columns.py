@@ -1,4 +1,4 @@
-"""Columns of what shows a test of its kind and of the checks of the residual, for the panels of ``check_plots``."""
+"""Columns of what shows a test of its kind and of the checks of the residual, for the panels of ``plots``."""
 
 import math
 

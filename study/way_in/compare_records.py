@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from study.compare.by_estimator import FREE_RUN
-from study.compare.running_on import has_lost_its_way
+from study.compare.comparison import Comparison, compare
+from study.compare.prediction import Prediction
 from study.equations.common_factor import on_moving_ground, per_unit_mass
 from study.equations.equations_of_motion import has_spring
 from study.equations.laid_variations import with_laid_variations
@@ -17,13 +18,14 @@ from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
+from study.identify.time_domain.stretch_states import is_smooth
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base, with_forces_by_coordinate
 from study.records.prepared import Prepared
 from study.records.readers.remarks import LEAVING_OUT
 from study.records.record import FORCE, Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 from study.records.sampling_rate import low_passed
-from study.support.errors import expect
+from study.support.errors import StudyError, expect
 
 ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
 
@@ -169,3 +171,32 @@ def compare_records(
         while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
             found = found_in(shorter)
     return found
+
+
+LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
+
+
+def has_lost_its_way(prediction: Prediction) -> bool:
+    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
+    return prediction.error > LOST and is_smooth(prediction.residual, len(prediction.views))
+
+
+def running_on(comparison: Comparison) -> Comparison:
+    """The comparison along motions that run on for as long as its model follows them.
+
+    That is how the model is compared by itself: what its predecessor lost is no reason to begin anew.
+    """
+    for longer in _longer(comparison.prepared):
+        try:
+            whole = compare(comparison.model, longer)
+        except StudyError:
+            continue
+        if not has_lost_its_way(whole.prediction):
+            return whole
+    return comparison
+
+
+def _longer(prepared: Prepared) -> list[Prepared]:
+    """The same record with motions that run on for longer, the longest first."""
+    longer = prepared.running_on
+    return [] if longer is None else [*_longer(longer), longer]

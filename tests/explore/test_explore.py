@@ -22,8 +22,7 @@ from study.explore import decimate, page_units, saved_files, words
 from study.explore import session as sessions
 from study.explore.axis_scales import log_ticks
 from study.explore.desk import Desk
-from study.explore.saved import saved
-from study.explore.saved_files import PAGE, files
+from study.explore.saved import PAGE, files, saved
 from study.explore.view import View, history_columns
 from study.records.prepared import prepare_record
 from study.support.errors import StudyError

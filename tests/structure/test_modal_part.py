@@ -23,7 +23,7 @@ from study.equations.simulate import Integrator, simulate
 from study.explore import session as sessions
 from study.explore.view import View
 from study.faults.accounting import Accounted
-from study.identify.frequency_domain.subspace import observability
+from study.identify.frequency_domain.modal_lines import observability
 from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
