@@ -10,8 +10,6 @@ from study.equations.model import Model
 from study.equations.place import GROUND, Place
 from study.support.arrays import Floats
 
-SMALL = 0.05  # of the largest stroke: a cycle of less is a rest
-
 
 @dataclass(frozen=True)
 class Loops:
@@ -41,7 +39,8 @@ def loops(comparison: Comparison, sensor: int = 0) -> Loops:
     largest, rows = float(np.ptp(u)), list[tuple[float, float, float]]()
     for first, last in itertools.pairwise(crossings):
         stroke = float(np.ptp(u[first : last + 1]))
-        if stroke < SMALL * largest or any(first < joint <= last for joint in joints):
+        # a cycle of a twentieth of the largest stroke is a rest
+        if stroke < 0.05 * largest or any(first < joint <= last for joint in joints):
             continue
         cycle = slice(first, last + 1)
         measured, predicted = (_energy(f[cycle], u[cycle]) for f in (seen.measured, seen.predicted))

@@ -23,7 +23,6 @@ from study.support.errors import StudyError, expect
 
 AS_WAS, MULTISINE, SWEEP, BLOW = "as was", "multisine", "sweep", "blows"
 LET_GO, PRELOADED = "release", "static preload"
-QUIETEST = 0.01  # level of a test: less than a hundredth of what the record reached drowns
 Band = tuple[float, float]
 
 
@@ -220,7 +219,8 @@ def possible_designs(
         levels = [share * loudest for share in shares if share > 0.3 or share * loudest >= 1.0]
         if kind == present.kinds[0][0] and reached(make(1.0)) <= 1.0 and _driven_within(make(1.0), present, limits):
             levels.append(1.0)
-        yield from (make(level) for level in levels if level >= QUIETEST)
+        # less than a hundredth of what the record reached drowns
+        yield from (make(level) for level in levels if level >= 0.01)
 
 
 def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:

@@ -25,8 +25,6 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, K
 
-ROUNDS = 4  # steps of Gauss and Newton towards the delay
-
 
 def late_force(diagnosis: Diagnosis) -> Fault | None:
     """The delay of the force that explains as much of a component's record as the first candidate; None without any.
@@ -52,7 +50,7 @@ def late_force(diagnosis: Diagnosis) -> Fault | None:
 def _moved(fit: FreeRunFit, prepared: Prepared) -> tuple[float, float, FreeRunFit, Prepared]:
     """Samples by which the force comes late, the standard error, and the fit to the force without that delay."""
     earlier, late, error, now = _mover(prepared), 0.0, 0.0, prepared
-    for _ in range(ROUNDS):
+    for _ in range(4):  # steps of Gauss and Newton towards the delay
         jacobian = linearise(fit, now)
         force = now.fitted - fit.residual
         columns = np.column_stack([jacobian, -now.outputs.stacked(_rates(now.outputs.apart(force), now))])

@@ -16,7 +16,6 @@ from study.explore.check_columns import FREE, PRESCRIBED, kind_of
 from study.explore.page_units import Scale, in_text
 
 Row = tuple[str, str, Any]
-DECADES = 300.0  # from the end of an axis of frequency down to its first decade
 
 
 def record_axes(comparison: Comparison, columns: Mapping[str, Columns]) -> list[Row]:
@@ -29,7 +28,8 @@ def record_axes(comparison: Comparison, columns: Mapping[str, Columns]) -> list[
         *(("range_time", f"{reset}{name}", at) for name, at in ends.items() for reset in ("", "reset_")),
         ("range_frequency", "end", last),
         ("range_frequency", "tags", [float(np.min(frequency[heard(comparison, frequency)], initial=last))]),  # of log f
-        ("frequency_decades", "ticks", log_ticks(last / DECADES, last)),
+        # the first decade of an axis of frequency lies so far below its end
+        ("frequency_decades", "ticks", log_ticks(last / 300.0, last)),
         ("range_force", "start", limits[0]), ("range_force", "end", limits[1]),
         ("force_ticks", "ticks", log_ticks(*limits)), ("history_ticks", "ticks", log_ticks(*log_axis(*history))),
         ("range_history", "factors", columns["history"]["name"][::-1]),

@@ -23,9 +23,6 @@ from study.support.units import parse_unit
 BASE = tuple(f"base_{motion}" for motion in MOTIONS)
 SAID = "the base moves: its acceleration, the other way round, is the force"
 PER_MASS = "all coefficients are per unit mass (give the inertia in the model for those of the structure)"
-LIKE = 0.02  # of its rms: a velocity that differs by less from a difference of the displacement is that difference
-ABOVE = 10.0  # the motion is followed up to the highest line at which it stands so many times above its noise
-DIGITAL = 0.95  # of all changes that are whole steps: then a displacement is digitised
 
 
 def on_a_moving_base(record: Record) -> bool:
@@ -99,7 +96,8 @@ def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
         if velocity in record:
             difference = np.diff(u, prepend=u[0]) / record.dt
             size = float(np.std(record[velocity]))
-            if size == 0.0 or float(np.std(record[velocity] - difference)) > LIKE * size:
+            # a velocity that differs from a difference of the displacement by 2 % of its rms is that difference
+            if size == 0.0 or float(np.std(record[velocity] - difference)) > 0.02 * size:
                 continue
             lags = "which lags by half a sample"
             said.append(f"the {velocity} in the file is the difference to the sample before, {lags}")
@@ -107,7 +105,8 @@ def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
         cut = Segments(segment_length(len(u), held=4, most=256))
         frequency, power = autospectrum(u - np.mean(u), record.dt, cut)
         noise = floor(u - np.mean(u), record.dt).noise ** 2 * 2.0 * record.dt
-        above = np.flatnonzero(power > ABOVE * noise)
+        # the motion is followed up to the highest line at which it stands ten times above its noise
+        above = np.flatnonzero(power > 10.0 * noise)
         highest = float(frequency[above[-1]]) if len(above) else 0.5 / record.dt
         slope = _smooth_slope(u, record.dt, highest)
         channels |= {str(velocity): slope, str(acceleration): np.gradient(slope, record.dt)}
@@ -150,7 +149,8 @@ def _without_flicker(u: Floats) -> Floats:
     change = np.abs(np.diff(u))
     steps = change[change > LAST_DIGITS * float(np.ptp(u))]
     step = float(np.min(steps)) if len(steps) else 0.0
-    if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < DIGITAL:
+    # a displacement is digitised where nearly all changes are whole steps
+    if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < 0.95:
         return u
     held, follower = np.empty_like(u), float(u[0])
     for i, value in enumerate(u.tolist()):

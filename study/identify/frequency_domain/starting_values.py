@@ -30,7 +30,6 @@ from study.support.least_squares import least_squares, normal_inverse
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
 FEWEST_LINES = 4  # two more than mass, damping and stiffness need
-MAIN_LOBE = 5  # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
 SHORT = 512  # samples below which coherence may be missing because the record is short
 CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
 PADDED = 4  # times as many lines as samples show, for the peak of a short decay
@@ -49,7 +48,8 @@ class LinearApproximation:
     @property
     def single(self) -> bool:
         """Whether the lines are as few and as near as those that a Hann window makes of one frequency."""
-        return self.neighbours <= MAIN_LOBE
+        # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
+        return self.neighbours <= 5
 
     def around(self, frequency: float) -> "LinearApproximation":
         """The lines within half an octave of a frequency in hertz."""

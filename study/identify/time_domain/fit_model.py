@@ -53,7 +53,6 @@ Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
 BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
-ASIDE = 1.2  # times the mass of a fit, where another begins that is to come back
 SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
 BESIDE = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
@@ -136,7 +135,8 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     The steady motion has the same error for any mass and the stiffness to it; what little is left (rounding, a force
     between its samples) chooses one of them, with a standard error that means nothing.
     """
-    heavier = _along_steady(fit.model.numbers(), omega, ASIDE)
+    # another fit begins a fifth heavier, and is to come back
+    heavier = _along_steady(fit.model.numbers(), omega, 1.2)
     again = _tried(fit.model.with_values(heavier), prepared, fit.held, heavier, KEPT)
     if fit.restarts or again is None or not (fit.converged and again.converged):
         return False

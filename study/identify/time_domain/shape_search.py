@@ -34,8 +34,6 @@ from study.support.least_squares import least_squares, length_or_one
 
 PERIODS = 100.0  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
-PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
-SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
 VARIED = "quantiles of what it varies with"
 STARTS = 4  # points of the search that start a fit
@@ -236,7 +234,8 @@ def points_to_try(entry: ModelTerm, u: Floats, base: Baseline) -> list[tuple[flo
         return np.add.outer(np.array(found), shifts).ravel() / (len(u) * base.prepared.dt)
 
     # a prescribed stroke may be many times the slip that closes a loop
-    sharp = SHARP if base.prescribed else ()
+    # per amplitude, of loops that close within a small part of a stroke
+    sharp = (15.0, 40.0, 100.0, 250.0) if base.prescribed else ()
     points: list[tuple[float, ...]] = [()]
     for parameter, given in zip(entry.term.parameters, entry.parameters, strict=True):
         points = [
@@ -351,7 +350,8 @@ def highest_lines(spectrum: Floats) -> list[float]:
     height = np.log(np.maximum(spectrum, 1e-300)) - np.log(np.maximum(level, 1e-300))
     inner = np.arange(3, n - 1)
     peaks = inner[(height[inner] >= height[inner - 1]) & (height[inner] > height[inner + 1])]
-    best = peaks[np.argsort(-height[peaks])][:PEAKS]
+    # the highest are tried as the frequency of a periodic effect
+    best = peaks[np.argsort(-height[peaks])][:6]
     return [float(i) + _top(height[i - 1 : i + 2]) for i in best]
 
 
