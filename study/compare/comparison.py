@@ -21,7 +21,7 @@ from study.compare.prediction import Prediction, SensorPrediction, predict
 from study.compare.unlike_records import unlike_in_words, unlike_records
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import LINEAR, Modes, is_positive, modes_of
+from study.equations.linear_part import LINEAR, Modes, modes_of
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
@@ -111,9 +111,7 @@ class Comparison:
 
     @cached_property
     def modes(self) -> Modes:
-        """Those of the linear part; none of a model without a mass."""
-        if not is_positive(self.fit.model, {}):
-            return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(self.model.coordinates))),) * 2)
+        """Those of the linear part; none of a component."""
         return modes_of(self.fit.model, self.found.symbols, self.found.covariance)
 
     @cached_property
@@ -218,7 +216,7 @@ def _of_a_structure(fit: FreeRunFit) -> list[str]:
     """What to say of several coordinates: motions that nothing ties down, values that the record does not show."""
     if not fit.model.named:
         return []
-    loose = 0 if fit.model.modal else loose_motions(fit.model)
+    loose = loose_motions(fit.model) if not (fit.model.prescribed or fit.model.modal) else 0
     drifts = f"nothing ties the structure down in {loose} of its motions: it may drift away as a whole"
     unclear = f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}"
     return [drifts if loose else "", unclear if fit.undecided else ""]

@@ -59,11 +59,6 @@ def separated(
         len(records) > 1,
         f"--each-record {names[0]}: there is one record; expected two or more, between which coefficients may differ",
     )
-    expect(
-        not model.modal,
-        f"--each-record {names[0]}: the linear part of the model is a sum of modes, which are those of one record; "
-        "expected each record by itself, as 'study compare' and 'study diagnose --each' take several",
-    )
     found = list(dict.fromkeys(item for name in names for item in _meant(model, name)))
     separate: list[Separate] = []
     for entry, component in found:
