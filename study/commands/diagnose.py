@@ -68,13 +68,8 @@ def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Recor
     from study.equations import terms
     from study.equations.model_file import read_model
     from study.faults.fault import settings_beside
-    from study.support.errors import expect
 
     model = read_model(arguments.model)
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
-    )
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
@@ -136,7 +131,7 @@ def _diagnosed(
     levels = levels_by_record(comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
-    if model.named:
+    if model.named and not model.prescribed:
         print("\n" + modes_before_and_after(diagnosis))
     print("\n" + words)
     if faults:

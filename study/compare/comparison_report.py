@@ -362,7 +362,7 @@ def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level
     heads, rows = _sensor_rows(comparisons) if named else _record_rows(comparisons)
     errors = tabulate(rows, heads, tablefmt="simple", disable_numparse=True, stralign="right", colglobalalign="right")
     bodies = [_levels(moving, comparisons)] if moving else [_values(comparisons[0])]
-    if named and len(comparisons) == 1:
+    if named and len(comparisons) == 1 and not comparisons[0].model.prescribed:
         bodies.append(modes_table(comparisons[0].modes, comparisons[0].model.coordinates))
     text = "\n\n".join([_headline(comparisons[0]), errors, *bodies, says_of_all(comparisons, moving)])
     notes = list(dict.fromkeys(note for c in comparisons for note in c.notes))

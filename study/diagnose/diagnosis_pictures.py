@@ -19,7 +19,6 @@ from study.figures.labels import term_names
 from study.figures.styles import in_style
 from study.support.numbers import percent
 
-SHOWN = 10
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
@@ -36,7 +35,8 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
             sets = [("as given", comparison.modes)]
             sets += [("with what is missing", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
             drawn["structure"] = structure_figure(comparison, sketch_of_diagnosis(diagnosis))
-            drawn["modes"] = modes(comparison, sets)
+            if not comparison.model.prescribed:
+                drawn["modes"] = modes(comparison, sets)
         return page.image_files(drawn)
 
 
@@ -60,7 +60,7 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
 
 def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     """Share of the held-out difference that each candidate explains, with its standard error."""
-    rows = diagnosis.candidates[:SHOWN]
+    rows = diagnosis.candidates[:10]
     place = np.arange(len(rows))
     shares = np.array([100.0 * r.gain.explained for r in rows])
     errors = np.array([100.0 * r.gain.error for r in rows])

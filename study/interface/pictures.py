@@ -63,7 +63,7 @@ class FitPictures:
         functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
         with drawing_axes(ax) as (axes,):
             if part == "magnitude":
-                drive = drive_of(self.comparison.prepared)
+                drive = drive_of(self._seen(None))
                 unit = f"{self._unit(self._seen(None))}/{self.comparison.record.units.get(drive, '')}"
                 return fit_panels.response_magnitude(axes, functions, unit, highest)
             return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
