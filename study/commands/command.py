@@ -51,6 +51,12 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
         yield step
 
 
+def say_left_out(*why: str) -> None:
+    """Say in one line what was left out, and why: sentences of ``extras.lacking``, empty where nothing lacks."""
+    if any(why):
+        print(f"Left out: {'; '.join(sentence for sentence in why if sentence)}.")
+
+
 def finite_number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:
     """A reader of finite numbers above one limit, not below the other and not beyond the last."""
 

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from study.compare import panels, place_panels
 from study.compare.comparison import Comparison
-from study.compare.dependence import explained_by_place
+from study.compare.place_sketch import sketch_of
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
-from study.figures.sketch import Sketch, sketch
+from study.figures.sketch import Sketch
 from study.figures.sketch_drawing import structure_sketch
 from study.support.numbers import percent
 
@@ -30,14 +30,6 @@ def place_figures(comparison: Comparison) -> dict[str, Figure]:
         **({} if comparison.model.prescribed else {"modes": modes(comparison, [("fitted", comparison.modes)])}),
         **restoring_forces(comparison),
     }  # fmt: skip
-
-
-def sketch_of(comparison: Comparison) -> Sketch:
-    """The sketch of a structure.
-
-    A connection glows with the held-out share of what is left that general functions of its own motion explain.
-    """
-    return sketch(comparison.model, comparison.missing.coordinates, explained_by_place(comparison.leftovers))
 
 
 def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
