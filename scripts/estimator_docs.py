@@ -18,7 +18,6 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
             raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 estimators' first")
     errors = pd.read_csv(table)
     for mark, block in {
-        "sentences": document.Bullets(study_pages.error_sentences(errors, noise)),
         "about": document.Text(study_pages.about_errors(errors)),
         "errors": study_pages.error_overview(errors),
         "bias": study_pages.bias_overview(errors, noise),

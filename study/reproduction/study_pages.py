@@ -269,7 +269,7 @@ def error_sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[s
             gains = errors.loc[keep & (errors["estimator"] == name), "gain"].dropna()
             if len(gains):
                 nearer = f"nearer than MI/SO in {int((gains > 1.0).sum())} of {len(gains)} parameters"
-                words.append(f"{where} {nearer}, its median gain {factor(gains.median())}")
+                words.append(f"{where} {nearer}, with a median gain of {factor(gains.median())}")
         lines.append(f"**{look(name).label}**: {'; '.join(words)}.")
     return tuple(lines)
 
@@ -279,16 +279,20 @@ def about_errors(errors: pd.DataFrame) -> str:
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
     return (
-        f"Median over {seeds} seeds of the error, in %, then the middle one of a case's parameters; in brackets the "
-        f"gain, the error of MI/SO over this one, likewise the middle one. Of these runs {trouble}."
+        f"Median error over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
     )
 
 
 def error_overview(errors: pd.DataFrame) -> Block:
-    """One row a case, one column an estimator: the median of its parameters' errors, and of their gains."""
+    """One row a case, one column an estimator: the median of its parameters' errors."""
     relative = errors[errors["kind"] == "relative"].groupby(["case", "estimator"], sort=False)
-    middles = relative[["median_error", "gain"]].median().reset_index().assign(kind="relative")
-    return by_estimator(middles, ("case",), ensemble.estimator_names(errors), _error_and_gain)
+    middles = relative[["median_error"]].median().reset_index()
+
+    def error(row: Row) -> str:
+        size = 100.0 * row["median_error"]
+        return f"{two_digits(size)} %" if math.isfinite(size) else "none"
+
+    return by_estimator(middles, ("case",), ensemble.estimator_names(errors), error)
 
 
 def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
