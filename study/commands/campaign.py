@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> None:
     found, refused, reused = list[Measured](), dict[str, str](), 0
     with progress(" records", len(records)) as step:
         for number, path in enumerate(records, 1):
-            step(f"{path.stem} ({number} of {len(records)})", len(records))
+            step(f"{path.stem} ({number} of {len(records)})", len(records) - number)
             digest, place = _digest(arguments, path), out / path.stem
             kept = _kept(place, digest)
             try:

@@ -26,8 +26,8 @@ class Command:
 class Step(Protocol):
     """Counts a step of some work, of so many where that is known."""
 
-    def __call__(self, doing: str, of: int | None = None) -> None:
-        """A step more, in which this is done."""
+    def __call__(self, doing: str, to_come: int | None = None) -> None:
+        """A step more, in which this is done; so many are still to come, as far as that is known."""
 
 
 @contextmanager
@@ -40,11 +40,11 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
 
     with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=harmless(name) or None) as bar:
 
-        def step(doing: str, of: int | None = None) -> None:
+        def step(doing: str, to_come: int | None = None) -> None:
             if doing:
                 bar.set_description(harmless(doing), refresh=False)
-            if of is not None:
-                bar.total = of
+            if to_come is not None:
+                bar.total = bar.n + 1 + to_come
             elif bar.total is not None:
                 bar.total = max(bar.total, bar.n + 2)  # this step and one that is still to come
             bar.update()

@@ -97,7 +97,9 @@ def diagnosed_together(
     with progress(" fits", name=name) as step:
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        found = diagnose_accounted(accounted, extra=own, without=without, progress=lambda _, total: step("", total))
+        found = diagnose_accounted(
+            accounted, extra=own, without=without, progress=lambda done, of: step("", max(of - done, 0))
+        )  # a set is searched, and a corrected record diagnosed, with counts of their own
     return found, separate
 
 

@@ -18,6 +18,7 @@ from study.support.thresholds import ALPHA, UNSTEADY
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 NAMED = 3  # effects that cannot be told apart, before the others are counted
 CLOSE = 0.05  # families this close to the best one are named with it
+MUCH = 0.1  # of the rms response above the noise: what leaves more is no model of the record, whatever is missing
 
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -38,10 +39,23 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
+def misses_much(diagnosis: Diagnosis) -> bool:
+    """Whether a model of which no effect is missing leaves far more than noise all the same."""
+    return diagnosis.verdict == NOTHING and diagnosis.comparison.prediction.above_noise > MUCH
+
+
 def _nothing(diagnosis: Diagnosis) -> str:
     comparison = diagnosis.comparison
     where = " at any place" if comparison.model.named else ""
     asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
+    if misses_much(diagnosis):
+        prediction = comparison.prediction
+        return (
+            f"No known effect is missing, but the model does not describe this record: the error of "
+            f"{_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
+            f"{percent(prediction.floor)}. None of {asked} explains any of it. Other modes may show, or a force that "
+            "was not measured: --near and --up-to choose one mode, 'linear: modal' in the model file takes several."
+        )
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
         f"{percent(comparison.prediction.error)}, and what is left looks like noise: it depends neither on the motion"

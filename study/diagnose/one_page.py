@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.adding import added_candidate
 from study.diagnose.diagnosis_files import all_names, diagnosis_in_words
-from study.diagnose.diagnosis_sentences import digits_between, effect_in_words
+from study.diagnose.diagnosis_sentences import digits_between, effect_in_words, misses_much
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
@@ -55,6 +55,10 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
     if diagnosis.verdict == "partly_known":
         effects += " is" if one else " are"
     headline = HEADLINES[diagnosis.verdict].format(effects=effects)
+    if misses_much(diagnosis):
+        headline = (
+            f"No known effect is missing, but the model misses {percent(before.prediction.error)} of the response"
+        )
     shown = after or before
     rows = [
         (c.key, term_names(c.term), *_value_and_interval(c), c.unit)

@@ -278,9 +278,7 @@ def about_errors(errors: pd.DataFrame) -> str:
     """What the numbers of :func:`error_overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
-    return (
-        f"Median error over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
-    )
+    return f"Median error over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
 
 
 def error_overview(errors: pd.DataFrame) -> Block:

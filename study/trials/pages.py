@@ -1,7 +1,7 @@
 """What docs say of the trials: reach beside its targets, what each constant does, which decays nobody could tell."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import cast
 
