@@ -289,7 +289,8 @@ def strung_together(
         if off > 1e-6:
             notes = [
                 *notes,
-                f"{rates}, {1e6 * off:.2g} ppm apart as two clocks are: both count as {1.0 / first.dt:.8g}",
+                f"{rates}, {1e6 * off:.2g} ppm apart as two clocks are: both are taken as {1.0 / first.dt:.8g} Hz "
+                "(--fs says otherwise)",
             ]
         for channel in (*first.forces, *map(str, first.sensors)):
             one, two = first.units.get(channel, ""), other.units.get(channel, "")
