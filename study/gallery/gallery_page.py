@@ -199,7 +199,7 @@ def told(entry: Entry) -> list[Block]:
 def of_literature(entry: Entry) -> list[Block]:
     """What was done to the structure, and what is known of it."""
     known = entry.known
-    return [document.Text(f"{known.test}. {known.source}"), document.Text(f"**In the literature.** {known.known}")]
+    return [document.Text(f"{known.test}. {known.source}"), document.Text(f"Known: {known.known}")]
 
 
 def published_and_found(entry: Entry) -> list[Block]:

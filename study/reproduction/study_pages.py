@@ -278,7 +278,7 @@ def about_errors(errors: pd.DataFrame) -> str:
     """What the numbers of :func:`error_overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
-    return f"Median error over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
+    return f"Median error in % over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
 
 
 def error_overview(errors: pd.DataFrame) -> Block:
@@ -288,7 +288,7 @@ def error_overview(errors: pd.DataFrame) -> Block:
 
     def error(row: Row) -> str:
         size = 100.0 * row["median_error"]
-        return f"{two_digits(size)} %" if math.isfinite(size) else "none"
+        return two_digits(size) if math.isfinite(size) else "none"
 
     return by_estimator(middles, ("case",), ensemble.estimator_names(errors), error)
 

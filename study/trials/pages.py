@@ -94,7 +94,7 @@ def _text(line: Row | None, aim: bool) -> str:
     if not aim:
         value, low, high = (_number(line[key], size) for key in ("value", "low", "high"))
         star, unit = " *" if line["reached"] == "no" else "", "" if size else " %"
-        return f"{value}{unit} ({low} to {high}; {line['trials']}){star}"
+        return f"{value}{unit} ({low}-{high}; {line['trials']}){star}"
     if math.isnan(most):
         return "" if math.isnan(least) else f"{_number(least, size)} %"
     return f"at most {most:g}" if math.isnan(least) else f"{_number(least, size)} to {_number(most, size)} %"
@@ -124,7 +124,7 @@ def _share(row: Row, name: str) -> str:
     if math.isnan(row[name]):
         return "-"
     low, high = row[f"{name}_low"], row[f"{name}_high"]
-    return f"{100.0 * row[name]:.3g} % ({100.0 * low:.3g} to {100.0 * high:.3g})"
+    return f"{100.0 * row[name]:.3g} % ({100.0 * low:.3g}-{100.0 * high:.3g})"
 
 
 def _rows(found: pd.DataFrame) -> list[Row]:
