@@ -13,8 +13,8 @@ from study.support.errors import StudyError
 from study.support.workflow_step import one_sentence
 
 SHOWN = (
-    "siso_stiffness", "duffing_share", "duffing_cubic", "van_der_pol_damping", "mathieu_stiffness",
-    "dead_band_stiffness", "dead_band_error", "error_free", "noise_random_only",
+    "siso_stiffness", "duffing_share", "duffing_cubic", "van_der_pol_damping", "dead_band_stiffness", "error_free",
+    "noise_random_only",
 )  # fmt: skip
 
 

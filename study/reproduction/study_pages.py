@@ -293,16 +293,6 @@ def error_overview(errors: pd.DataFrame) -> Block:
     return by_estimator(middles, ("case",), ensemble.estimator_names(errors), error)
 
 
-def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
-    """One row a case with noise, one column an estimator: the largest bias over scatter, and whose it is."""
-    worst = ensemble.worst_bias(errors[errors["case"].map(noise) > 0.0])
-
-    def ratio(row: Row) -> str:
-        return f"{two_digits(row['ratio'])} ({row['parameter']})"
-
-    return by_estimator(worst, ("case",), ensemble.estimator_names(errors), ratio)
-
-
 def _error_and_gain(row: Row) -> str:
     scale, unit = (100.0, " %") if row["kind"] == "relative" else (1.0, "")
     size = f"{two_digits(scale * row['median_error'])}{unit}" if math.isfinite(row["median_error"]) else "none"
