@@ -31,7 +31,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
     """What is asked for beside the effects of the library, and what is not."""
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA",
-        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter that is fitted",
+        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 

@@ -98,7 +98,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
-        said.append(f"{percent(diagnosis.left)} of the response is left beside it that is no noise.")
+        said.append(f"{percent(diagnosis.left)} of the response is still unexplained beside it, and is not noise.")
     if first.unphysical:
         said.append(f"As fitted it is not physical: {first.unphysical}.")
     if first.tied_with:
@@ -169,7 +169,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
             f"{percent(shares[0][1])} of what is unexplained, held out."
         )
     else:
-        said.append("None of displacement, velocity, the past or time explains a tenth of it.")
+        said.append("Neither displacement, velocity, the past nor time explains a tenth of it.")
     return said
 
 

@@ -104,11 +104,11 @@ def _in_brackets(formula: str) -> str:
 
 def _how_sure(diagnosis: Diagnosis) -> str:
     """What chance does, and what was asked for."""
-    asked = f"{diagnosis.asked} effects {'at places ' if diagnosis.comparison.model.named else ''}were asked for."
+    asked = f"{diagnosis.asked} effects {'at places ' if diagnosis.comparison.model.named else ''}were tried."
     if diagnosis.answer is None:
         return asked
     chance = max(diagnosis.answer.p_value, 1e-12)
-    return f"Chance explains such a gain with a probability of {chance:.1g} or less; {asked}"
+    return f"The probability that chance alone gains as much is {chance:.1g} or less; {asked}"
 
 
 def _errors(before: Comparison, after: Comparison | None) -> tuple[tuple[str, str, str], ...]:

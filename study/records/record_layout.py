@@ -36,7 +36,7 @@ class Layout:
     fit: Span | None = None  # samples to fit ...
     judge: Span | None = None  # ... and to judge
     alternate: bool = False  # whether every other block is judged
-    response: str | None = None  # the measured motion that free runs are held against
+    response: str | None = None  # the measured motion that free runs are compared with
     cutoff: float | None = None  # hertz above which a measured acceleration is integrated
     near: float | None = None  # hertz near which the mode lies that is meant, where the record shows several
     highest: float | None = None  # hertz above which nothing is used

@@ -29,7 +29,7 @@ def test_the_page_says_what_is_missing_before_and_after(content):
     assert content.completed == "m d^2u/dt^2 + c v + k u + c2 v|v| = F(t)"
     assert content.after.prediction.error < content.before.prediction.error
     assert [row[0] for row in content.coefficients] == ["m", "c", "k", "c2"]
-    assert "were asked for" in content.says[1]
+    assert "were tried" in content.says[1]
 
 
 def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
