@@ -39,8 +39,8 @@ def one_page_files(content: OnePage) -> dict[str, bytes]:
     """``report.html`` and ``report.pdf``."""
     with in_style():
         picture = Figure(figsize=(_Sheet.inner(), 2.5))
-        draw(list(picture.subplots(1, 2, gridspec_kw={"wspace": 0.28}).flat), content)
-        picture.subplots_adjust(left=0.105, right=0.99, bottom=0.17, top=0.84)
+        draw(list(picture.subplots(1, 2, gridspec_kw={"wspace": 0.3}).flat), content)
+        picture.subplots_adjust(left=0.13, right=0.99, bottom=0.17, top=0.84)
         drawn = page.rendered(picture, "svg")
         return {"report.html": as_html(content, drawn), "report.pdf": page.rendered(sheet(content), "pdf")}
 
