@@ -37,11 +37,14 @@ def revise(
 ) -> None:  # fmt: skip
     """Fit the model and the changed one to every record, write model and history, and say what was reached.
 
-    ``text`` is the model file's with the change, which is a term ``added`` or ``dropped``.
+    ``text`` is the model file's with the change, which is a term ``added`` or ``dropped``. A term that raises the error
+    of each record is not added, unless the arguments say ``anyway``: then nothing is written.
     """
     from study.compare import history
     from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
     from study.diagnose.needless import needless, of_records
+    from study.figures.labels import term_names
+    from study.support.numbers import percent
 
     steps, records = history.read_history(arguments.model), read_records(arguments, model)
     before: list[Comparison] = []
@@ -58,6 +61,16 @@ def revise(
     said = of_records([record.name for record in records], unneeded, any_more=added is not None)
     for first, second in zip(before, after, strict=True):
         steps = history.with_step(steps, history_step(first), history_step(second, added, dropped))
+    errors = [(percent(b.prediction.error), percent(a.prediction.error)) for b, a in zip(before, after, strict=True)]
+    rises = all(a.prediction.error > b.prediction.error for b, a in zip(before, after, strict=True))
+    if added and rises and not arguments.anyway and all(b != a for b, a in errors):
+        rows, name = ", ".join(f"from {b} to {a}" for b, a in errors), term_names(added)
+        print(comparison_summary(after))
+        print(
+            f"\n{name[0].upper()}{name[1:]} raises the error of what was not fitted, {rows}: {arguments.model} is left "
+            "as it was, and nothing is written (--anyway adds it all the same)."
+        )
+        return
     written_together(arguments, text, steps, as_json(comparison_document(after)), folder)
     print(comparison_summary(after))
     print("\n" + history.history_table(steps) + (f"\n\n{said}" if said else ""))

@@ -2,12 +2,22 @@
 
 import argparse
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from study.commands.command import Command, finite_number, whole_number
 
+if TYPE_CHECKING:
+    from study.equations.model import Model
+    from study.equations.simulate import Integrator
+    from study.support.arrays import Floats
+
 MOST_SAMPLES = 10_000_000
 USUAL, MOST_STEPS = 8, 1000
+LOOK = 32_768  # samples at most, on which the steps are tried
+SETTLED_BY = 1e-3  # of the response: what twice the steps may change
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +44,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--steps", type=whole_number(1, 10_000),
-        help="steps per sample (default: 8, or more where the system's own frequency asks for them)",
+        help="steps per sample (default: 8, or as many as it takes until twice the steps change no motion by 0.1 %%)",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("record.csv"), help="where to (default %(default)s)")
 
@@ -43,11 +53,13 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare.history import path_of
     from study.equations.linear_part import modes_of, modes_table
     from study.equations.model_file import read_model
+    from study.equations.motion_program import motion_program
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
     from study.support.errors import at, expect
     from study.support.files import keep, replacing
+    from study.support.numbers import percent
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model, dt = read_model(arguments.model), arguments.dt
@@ -61,13 +73,21 @@ def _run(arguments: argparse.Namespace) -> None:
     forces = {name: force(excitation, arguments.samples, dt, seed) for seed, name in seeds}
     modes = modes_of(model) if model.named else None
     rate = 2.0 * math.pi * modes.frequency.max() if modes else math.sqrt(abs(values.get("k", 0.0)) / values["m"])
-    steps = arguments.steps or _enough(rate, dt)
-    record = simulate(model, forces, dt, Integrator("rk4" if modes else "abm4", steps))
+    # Runge-Kutta alone cuts a step where dry friction switches
+    method = "rk4" if modes or len(motion_program(model, (), ()).sides) else "abm4"
+    steps, changed = arguments.steps or _enough(rate, dt), 0.0
+    if not arguments.steps:
+        steps, changed = _settled(model, forces, dt, Integrator(method, steps))
+    record = simulate(model, forces, dt, Integrator(method, steps))
     with replacing(arguments.out) as beside:
         write_csv(record, beside)
     sizes = [(f"{name} at {where}" if where else name, forces[name].std()) for name, where in model.forces]
     driven = ", ".join(f"{name} of rms {size:.4g} N" for name, size in sizes)
     print(f"{arguments.out}: {len(record)} samples, {arguments.samples * dt:g} s of {model.name}, {driven}")
+    if changed > SETTLED_BY:
+        print(
+            f"{steps} steps a sample, and twice as many change a motion by {percent(changed)}: it is chaotic, or jumps"
+        )
     if modes:
         print(modes_table(modes, model.coordinates))
 
@@ -77,6 +97,30 @@ def _enough(rate: float, dt: float) -> int:
     from study.equations.simulate import TURN
 
     return min(max(USUAL, math.ceil(rate * dt / TURN)), MOST_STEPS)
+
+
+def _settled(
+    model: "Model", forces: "Mapping[str, Floats]", dt: float, integrator: "Integrator"
+) -> tuple[int, float]:  # fmt: skip
+    """Steps per sample that follow the terms that are there, and by what share of a motion twice as many change it."""
+    import numpy as np
+
+    from study.equations.simulate import simulate
+    from study.records.record import Sensor
+
+    look = {name: samples[:LOOK] for name, samples in forces.items()}
+    sensors = [Sensor(c, "displacement") for c in model.coordinates]
+
+    def motions(steps: int) -> "Floats":
+        return simulate(model, look, dt, replace(integrator, steps_per_sample=steps)).columns(sensors)
+
+    steps, coarse = integrator.steps_per_sample, motions(integrator.steps_per_sample)
+    while True:
+        fine = motions(2 * steps)
+        changed = float(np.max(np.std(fine - coarse, axis=0) / np.maximum(np.std(fine, axis=0), 1e-300)))
+        if changed <= SETTLED_BY or 4 * steps > MOST_STEPS:
+            return steps, changed
+        steps, coarse = 2 * steps, fine
 
 
 COMMAND = Command(

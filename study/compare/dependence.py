@@ -199,8 +199,8 @@ def _one_by_one(left: Unexplained, columns: Floats) -> list[Gain]:
     early, late = freed[: left.split], freed[left.split :]
     power = np.sum(early[:, 1:] ** 2, axis=0)
     each = early[:, 1:].T @ early[:, 0] / np.where(power > 0.0, power, np.inf)
-    before, beside_own = left.residual[left.split :], _beside_own(left)
-    return [statistics.gain_beside(before, a * late[:, i], beside_own) for i, a in enumerate(each, 1)]
+    before, beside_own, evenly = left.residual[left.split :], _beside_own(left), left.base.prepared.free
+    return [statistics.gain_beside(before, a * late[:, i], beside_own, evenly=evenly) for i, a in enumerate(each, 1)]
 
 
 def _shapes(place: Place, left: Unexplained) -> dict[str, Floats]:
@@ -285,7 +285,8 @@ def _held_out(left: Unexplained, columns: Floats) -> Gain:
     early, late = design[: left.split], design[left.split :]
     amounts = least_squares(early, left.residual[: left.split], 1e-6)
     amounts[: left.own.shape[1]] -= least_squares(left.own[: left.split], left.residual[: left.split], 1e-6)
-    return statistics.gain_beside(left.residual[left.split :], late @ amounts, _beside_own(left))
+    evenly = left.base.prepared.free  # of a decay: what a change explains lies in the loud blocks
+    return statistics.gain_beside(left.residual[left.split :], late @ amounts, _beside_own(left), evenly=evenly)
 
 
 def _beside_own(left: Unexplained) -> Floats:

@@ -19,7 +19,7 @@ from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.part_fit import with_states
 from study.identify.time_domain.shape_search import Baseline, sensitivity
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
 
@@ -168,8 +168,9 @@ def _entry(model: Model, name: str) -> ModelTerm:
 def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     """Spectra of each coefficient's unit force, and of the measured force, as the response would show them.
 
-    Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
-    receptance, so that noise on the response weighs as it does in a free run.
+    Real and imaginary parts of the lines that the force drives, one array a key; of stretches one after the other, as a
+    free run begins anew in each. Weighted with the linear receptance, so that noise on the response weighs as it does
+    in a free run.
     """
     alone, prepared = model_alone(model), prepared_alone(base.prepared) if is_alone(model) else base.prepared
     named = dict(zip(alone.values, model.values, strict=True))
@@ -177,19 +178,25 @@ def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     if prepared.free:  # its inertia force is what the others have to balance
         mass, inputs = float(alone.values["m"] or 1.0), without_inertia(inputs)
         part = part.with_channels({"force": -mass * part["acceleration"]})
-    taper = np.hanning(len(part) + 1)[:-1]
-    frequency = np.asarray(rfftfreq(len(part), part.dt))
-    force = np.asarray(rfft(taper * part["force"]))
-    loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
-    keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
-    if not np.any(keep):
+    histories = [(item, np.asarray(input_history(item, part))) for item in inputs]
+    columns: dict[str, list[Floats]] = {}
+    target: list[Floats] = []
+    for first, last in part.runs((0, len(part))):
+        taper = np.hanning(last - first + 1)[:-1]
+        frequency = np.asarray(rfftfreq(last - first, part.dt))
+        force = np.asarray(rfft(taper * part["force"][first:last]))
+        loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
+        keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
+        weight = base.paths(last - first)[keep, 0, 0]
+        target.append(_real(force[keep] * weight))
+        for item, history in histories:
+            spectrum = np.asarray(rfft(taper * history[first:last]))[keep] * weight
+            for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
+                columns.setdefault(named[k.symbol], []).append(_real(spectrum * power))
+    if not any(map(len, target)):
         raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
-    weight = base.paths(len(part))[keep, 0, 0]
-    columns: dict[str, Floats] = {}
-    for item in inputs:
-        spectrum = np.asarray(rfft(taper * input_history(item, part)))[keep] * weight
-        for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
-            lines = spectrum * power
-            columns[named[k.symbol]] = np.concatenate([lines.real, lines.imag])
-    force = force[keep] * weight
-    return columns, np.concatenate([force.real, force.imag])
+    return {key: np.concatenate(lines) for key, lines in columns.items()}, np.concatenate(target)
+
+
+def _real(lines: Complexes) -> Floats:
+    return np.concatenate([lines.real, lines.imag])

@@ -70,9 +70,13 @@ class SetSearch:
         """The set without one of its effects, fitted if it was not."""
         fewer = names - {name}
         if fewer and fewer not in self.tried:
-            whole = self.tried[names]
-            self.fit([SetStart(fewer, whole.fit.model.without_term(name), whole)])
+            self.fit([start_without(self.tried[names], name)])
         return self.tried.get(fewer)
+
+
+def start_without(whole: FittedCandidate, name: str) -> SetStart:
+    """A set without one of its effects, begun where the fit of all ended."""
+    return SetStart(frozenset(whole.names) - {name}, whole.fit.model.without_term(name), whole)
 
 
 def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
@@ -82,21 +86,25 @@ def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
 
 def searched(
     base: Baseline, singles: Sequence[FittedCandidate], settled: Sequence[FittedCandidate],
-    done: Callable[[FittedCandidate], bool], fewer_than: int | None = None, progress: Progress | None = None,
+    not_alone: Sequence[ModelTerm], done: Callable[[FittedCandidate], bool], fewer_than: int | None = None,
+    progress: Progress | None = None,
 ) -> SetSearch:  # fmt: skip
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
-    ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley.
-    ``done`` says whether a set leaves nothing to be explained;
-    ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple effects with fewer
-    are asked for.
+    ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley,
+    ``not_alone`` simple ones beside which alone no motion stays finite. ``done`` says whether a set leaves nothing to
+    be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple
+    effects with fewer are asked for.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
-    search = SetSearch(base, {c.name: c.entry for c in singles}, offered, {frozenset(c.names): c for c in singles})
+    offered |= {entry.name: entry for entry in not_alone}
+    entries = {c.name: c.entry for c in singles} | {entry.name: entry for entry in not_alone}
+    search = SetSearch(base, entries, offered, {frozenset(c.names): c for c in singles})
     sizes = range(2, MOST + 1)
     search.fit(SetStart(frozenset(c.names), c.fit.model) for c in settled)
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
     best = next(iter(search.sets(1, simple=fewer_than is not None)), None)
+    patient = True
     for size in sizes:
         simple = fewer_than is not None
         if best is None or (fewer_than is not None and size >= fewer_than):
@@ -109,18 +117,26 @@ def searched(
             starts += set_screening.by_sensitivities(None, asked, base, [size], EACH)[size]
         report = None if progress is None else partial(_counted, progress, len(search.tried))
         search.fit(starts, report)
-        for parent in _parents(search.sets(size), simple=simple):  # one may change places with another
-            exchanged = set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
-            search.fit([start for start in exchanged if start.names not in search.tried], report)
+        seen = set[frozenset[str]]()
+        while parents := [p for p in _parents(search.sets(size), simple=simple) if frozenset(p.names) not in seen]:
+            for parent in parents:  # one effect may change places with another
+                exchanged = set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
+                search.fit([start for start in exchanged if start.names not in search.tried], report)
+            seen |= {frozenset(parent.names) for parent in parents}
         larger = next(iter(search.sets(size, simple=simple)), None)
-        if larger is None or not gains(best, larger, len(starts)):
+        gained = larger is not None and gains(best, larger, len(starts))
+        if larger is None or not (gained or patient):
             break
-        best = larger
+        patient = gained  # of three effects that act together no two need gain alone
+        best = larger if gained else best
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
-    for names in [frozenset(c.names) for size in sizes for c in search.sets(size)[:2]]:
-        for name in names:
-            search.without(names, name)
+    for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
+        search.fit(
+            [start_without(best, name) for name in best.names]
+        )  # beside others an effect may leave a side valley
+        for name in (n for c in others for n in c.names):
+            search.without(frozenset(others[0].names), name)
     return search
 
 
@@ -134,7 +150,8 @@ def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool
         one, other = (np.concatenate([c.fit.residual, c.prediction.residual]) for c in (smaller, larger))
     else:
         one, other = smaller.prediction.residual, larger.prediction.residual
-    return statistics.gain(one, other).p_value * asked < ALPHA
+    evenly = smaller.prediction.prepared.free  # of a decay: what a set explains lies in the loud blocks
+    return statistics.gain(one, other, evenly=evenly).p_value * asked < ALPHA
 
 
 def _parents(sets: Sequence[FittedCandidate], *, simple: bool) -> list[FittedCandidate]:

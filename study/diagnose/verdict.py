@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from study.compare import dependence
-from study.compare.comparison import Comparison
+from study.compare.comparison import Comparison, compare
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.diagnose import candidates, set_search, varying_candidates
-from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
+from study.diagnose.candidates import FittedCandidate, Progress, unknowns_of, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
 from study.diagnose.ranked import Ranked
@@ -29,9 +29,10 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
 from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
-from study.support.errors import DivergenceError
+from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
 MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
@@ -121,6 +122,8 @@ def diagnose(
             return found  # else nothing that is named changes, and the record is judged as it was
         elsewhere = len(changes)
     tried = tried or candidates.try_all(entries, base, progress)
+    if (freed := _freed(comparison, base, tried)) is not None:
+        return diagnose(freed, extra=extra, without=without, progress=progress)
     return _diagnosis(comparison, base, tried, entries, progress, elsewhere)
 
 
@@ -131,7 +134,7 @@ def _diagnosis(
     """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew."""
     asked = (len(entries) if base.several else len(tried)) + elsewhere
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    decision = _decide(rows, tried, base, comparison, asked, progress)
+    decision = _decide(rows, tried, entries, base, comparison, asked, progress)
     families: list[FamilyGain] = []
     if decision.verdict == UNKNOWN:
         families = dependence.families(dependence.unexplained(base))
@@ -140,6 +143,26 @@ def _diagnosis(
     return Diagnosis(
         decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
     )
+
+
+def _freed(comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate]) -> Comparison | None:
+    """The comparison with the deeper minimum that the model itself has where its best candidate ended; None if none is.
+
+    An effect that only freed the fit of the model from a side valley is not missing.
+    """
+    best = min(tried, key=lambda c: c.fit.rms, default=None)
+    if best is None or comparison.model.modal or comparison.fit.restarts or not base.fit.keys:
+        return None
+    ended = dict(zip(best.fit.keys, best.fit.values.tolist(), strict=True))
+    values = {key: ended[key] for key in base.fit.keys if key in ended}
+    try:
+        fit = fit_part(base.fit.model, base.prepared, base.fit.held, values, steps=base.fit.steps_per_sample)
+        if base.fit.rms - fit.rms <= TOLERANCE * base.prepared.spread:
+            return None
+        freed = compare(comparison.model, comparison.prepared, fit=finished(fit, comparison.prepared))
+    except StudyError:
+        return None
+    return freed if freed.fit.rms < comparison.fit.rms else None
 
 
 def search_part(prepared: Prepared) -> Prepared:
@@ -174,8 +197,8 @@ class _Decision:
 
 
 def _decide(
-    rows: list[Ranked], tried: Sequence[FittedCandidate], base: Baseline, comparison: Comparison, asked: int,
-    progress: Progress | None,
+    rows: list[Ranked], tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm], base: Baseline,
+    comparison: Comparison, asked: int, progress: Progress | None,
 ) -> _Decision:  # fmt: skip
     """One effect that explains everything; else the set that does, as far as the record bears it."""
     prediction, own = comparison.prediction, held_out_of(comparison)
@@ -191,7 +214,14 @@ def _decide(
         fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
     changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
-    search = searched(base, tried, settled, lambda c: _left(c.fit, c.prediction) <= TOLERANCE, fewer_than, progress)
+    known = {c.name for c in tried}
+    # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
+    not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
+    search = searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
+    deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
+    if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
+        rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)
+        return _decide(rows, deeper, entries, base, comparison, asked, progress)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
@@ -258,8 +288,12 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
 def _material(
     answer: Ranked, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
 ) -> tuple[Ranked, float]:
-    """The set without effects that explain less than what is left beside all: they imitate a part of that."""
-    ranked = {frozenset(r.names): r for r in sets}
+    """The set without effects that explain less than what is left beside all: they imitate a part of that.
+
+    Without those as well that explain no more than models of real structures leave, and next to nothing of what is
+    unexplained: the others are missing, whatever is missing besides.
+    """
+    ranked, unexplained = {frozenset(r.names): r for r in sets}, comparison.prediction.error
     left = _left(answer.fit, answer.prediction)
     while len(answer.entries) > 1:
         names = frozenset(answer.names)
@@ -267,12 +301,16 @@ def _material(
         least = min(smaller, key=lambda c: c.prediction.error, default=None)
         if least is None:
             break
-        explains = math.sqrt(max(least.prediction.error**2 - answer.prediction.error**2, 0.0))
+        whole = search.tried.get(names, answer)  # fitted on as much of the record
+        explains = math.sqrt(max(least.prediction.error**2 - whole.prediction.error**2, 0.0))
+        little = explains <= GOOD and explains**2 <= (1.0 - ENOUGH) * unexplained**2
         # shapes of the motion do not see all that a model leaves: what stands above white noise counts as well
-        if explains >= max(left, answer.prediction.above_noise):
+        if explains >= max(left, answer.prediction.above_noise) and not little:
             break
         fewer = ranked.get(frozenset(least.names))
-        answer = fewer if fewer is not None else rank([least], comparison, len(search.tried))[0]
+        if fewer is None:
+            fewer = rank(with_best_settled([least], comparison.prepared), comparison, len(search.tried))[0]
+        answer = fewer
         left = _left(answer.fit, answer.prediction)
     return answer, left
 
@@ -319,6 +357,12 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     return alone and first.gain.explained > MOST and not first.unphysical
 
 
+def _leaves_nothing(candidate: FittedCandidate) -> bool:
+    """Whether nothing is left for a further effect: shapes of the motion see nothing, noise alone leaves as much."""
+    prediction = candidate.prediction
+    return prediction.above_noise <= TOLERANCE and _left(candidate.fit, prediction) <= TOLERANCE
+
+
 def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     """Rms over that of the response which shapes of the motion, of its past and of time explain of a residual.
 
@@ -326,4 +370,7 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     """
     nameless = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
     left = dependence.left_by(fit, prediction.prepared)
-    return prediction.error * float(np.sqrt(dependence.significant_share(left, nameless)))
+    of_motion = prediction.error * float(np.sqrt(dependence.significant_share(left, nameless)))
+    # shapes tell little in a decay's few loud blocks, or where nothing brings a motion back: there what stands above
+    # white noise counts, as no force is there whose noise the motion could have coloured, or not for long
+    return max(of_motion, prediction.above_noise) if prediction.prepared.record.stretches else of_motion

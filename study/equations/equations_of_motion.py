@@ -205,8 +205,10 @@ def has_spring(model: Model) -> bool:
 
 
 def _ties(entry: ModelTerm) -> bool:
-    """Whether the force of a term at rest depends on the displacement."""
+    """Whether the force of a term at rest depends on the displacement, and not so that it repeats itself further on."""
     graph, term = Graph(), entry.term
+    if term.repeats:
+        return False
     names = {n: graph.input(n) for n in ("u", "t", "z", *term.channels, *(p.name for p in term.parameters))}
     names["v"] = graph.const(0.0)
     rate = formulas.add_formula(graph, term.state, names) if term.state is not None else None

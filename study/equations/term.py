@@ -103,6 +103,9 @@ class Term:
     reported: tuple[str, ...] = ()
     either_sign: bool = False  # as hardening and softening do: a trial then draws its sign
     placeless: bool = False  # whether it is the same wherever the system rests, but for another linear stiffness
+    repeats: bool = (
+        False  # whether its force is the same again some distance further on, so that it brings nothing back
+    )
     angle: bool = False  # whether its displacement is an angle, in radians: it is no effect of a coordinate in metres
     variation: "Variation | None" = None  # where it is what the coefficients of another term change by
 

@@ -32,7 +32,7 @@ def _single(
     component = Component(symbol, shape, order, factor)
     return Term(
         name, (component,), formula or shape, meaning, cause, parameters, state, conditions, reported,
-        either_sign, placeless, angle,
+        either_sign=either_sign, placeless=placeless, angle=angle,
     )  # fmt: skip
 
 
@@ -252,6 +252,7 @@ _TERMS = (
             ),
         ),
         placeless=True,
+        repeats=True,
     ),
 )  # fmt: skip
 

@@ -26,6 +26,8 @@ PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly th
 BLOCKS = 24  # of a stretch, at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
+STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
+OUTRIGHT = 3.0  # ... had taken so many times less
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,9 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
     else:
         stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
+        if free and not layout.use:
+            unbroken = [_unbroken(stretch, sensors) for stretch in stretches]
+            stretches, notes = [s for s, _ in unbroken], [*notes, *(said for _, said in unbroken if said)]
         stretches = [_until_rest(s, sensors) for s in stretches] if turns and anew else stretches
         middle = (stretches[0].first + stretches[0].last) // 2
         fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
@@ -216,6 +221,30 @@ def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
     loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
     last = int(loud[-1]) + 1 if len(loud) else 0
     return replace(stretch, last=stretch.first + min(max(last, 2 * FEWEST), len(stretch)))
+
+
+def _unbroken(stretch: Stretch, sensors: Sequence[Sensor]) -> tuple[Stretch, str]:
+    """A stretch of a free decay up to where the motion breaks off, touched or stopped, and a sentence if it does.
+
+    Nothing that damps a motion takes most of it within a period or two and had taken little in those before: dry
+    friction takes the same in every period, all else less and less.
+    """
+    values = stretch.source.columns(sensors, (stretch.first, stretch.last))
+    values = (values - np.mean(values, axis=0)) / np.std(values, axis=0)
+    step = max(int(0.5 * period_of(stretch, sensors)), 1)
+    starts = range(0, len(values) - 2 * step + 1, step)
+    sizes = np.array([np.max(np.std(values[a : a + 2 * step], axis=0)) for a in starts])
+    for i in range(3, len(sizes) - 3):  # what breaks off does so within one of these, which overlap by half
+        stops = np.max(sizes[i + 3 :]) < STOPPED * sizes[i]
+        if stops and sizes[i] - sizes[i + 3] > OUTRIGHT * max(sizes[i - 3] - sizes[i], 0.0):
+            alive = np.max(np.abs(values - np.mean(values[-step:], axis=0)), axis=1) > 0.5 * sizes[i]
+            last = stretch.first + int(np.flatnonzero(alive)[-1]) + 1
+            at_time = stretch.source.start + last * stretch.source.dt
+            return replace(stretch, last=last), (
+                f"{stretch.source.name}: the motion breaks off at {at_time:.4g} s, sooner than damping could end it; "
+                "what follows is left out (--use S:T chooses otherwise)"
+            )
+    return stretch, ""
 
 
 def alternating(

@@ -77,15 +77,16 @@ def _of_even_changes(before: Floats, change: Floats) -> Floats:
     return np.asarray(np.add.reduceat(before * change, edges), dtype=np.float64)
 
 
-def gain_beside(before: Floats, change: Floats, freed: Floats) -> Gain:
+def gain_beside(before: Floats, change: Floats, freed: Floats, *, evenly: bool = False) -> Gain:
     """What a change of the prediction explains of ``before``, which the model's own coefficients leave, all shape (n,).
 
     These come from other samples with errors, and what errors leave goes with the motion as the change does: by chance
     of a few coefficients, not of n samples. With J the sensitivities and C the covariance of the coefficients over the
     noise's variance s^2, ``cov = s^2 (I + J C J^T)``, and the test is of ``change^T cov^-1 before``, in which
     ``s^2 cov^-1 before`` is what coefficients fitted to these samples as well leave (Woodbury, 1950): ``freed``.
+    ``evenly`` as of :func:`gain`.
     """
-    return replace(gain(before, before - change), p_value=gain(freed, freed - change).p_value)
+    return replace(gain(before, before - change), p_value=gain(freed, freed - change, evenly=evenly).p_value)
 
 
 def worse(first: Floats, second: Floats) -> float:

@@ -45,7 +45,7 @@ def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: st
         names=chosen, name=" + ".join(chosen), entry=SimpleNamespace(name=chosen[0]), unknowns=unknowns,
         flexible=unknowns > len(chosen), unphysical=unphysical, power=float(np.mean(left**2)),
         fit=SimpleNamespace(model=model, residual=left[:N]),
-        prediction=SimpleNamespace(residual=left[N:], prepared=SimpleNamespace(record=record)),
+        prediction=SimpleNamespace(residual=left[N:], prepared=SimpleNamespace(record=record, free=False)),
     )  # fmt: skip
 
 
@@ -79,13 +79,16 @@ class Bench:
             for n in sizes
         }
 
-    def search(self, *, done: bool = False, fewer_than: int | None = None) -> SetSearch:
-        singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES]
+    def search(self, *, done: bool = False, fewer_than: int | None = None, lost: str = "") -> SetSearch:
+        """``lost`` are effects whose fit alone has no finite motion."""
+        singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES if name not in lost]
+        not_alone = [effect(name) for name in lost]
         base: Any = None
-        return searched(base, singles, [], lambda _: done, fewer_than)
+        return searched(base, singles, [], not_alone, lambda _: done, fewer_than)
 
     def sizes(self) -> set[int]:
-        return {len(names) for names, _ in self.fitted}
+        """Of the sets of several effects."""
+        return {len(names) for names, _ in self.fitted if len(names) > 1}
 
 
 def hidden(names: str) -> Leaves:
@@ -106,7 +109,51 @@ def test_a_set_grows_until_one_effect_more_gains_nothing(monkeypatch: pytest.Mon
 
     smaller = Bench(monkeypatch, hidden("ad"))
     assert best(smaller.search(), 2) == "ad"
-    assert smaller.sizes() == {2, 3}
+    assert smaller.sizes() == {2, 3, 4}
+
+
+def test_one_size_may_gain_nothing_but_not_two(monkeypatch: pytest.MonkeyPatch):
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        """Three effects that do something together alone."""
+        return {} if {"a", "b", "c"} <= found else {"a": 1.0}
+
+    assert best(Bench(monkeypatch, leaves).search(), 3) == "abc"
+    nothing = Bench(monkeypatch, lambda _: {"a": 1.0})
+    nothing.search()
+    assert nothing.sizes() == {2, 3}
+
+
+def test_an_effect_beside_which_alone_no_motion_is_finite_is_asked_for_in_sets(monkeypatch: pytest.MonkeyPatch):
+    assert best(Bench(monkeypatch, hidden("abd")).search(lost="b"), 3) == "abd"
+
+
+def test_an_effect_alone_is_fitted_again_from_where_a_set_with_it_ended(monkeypatch: pytest.MonkeyPatch):
+    """Its first fit ended in a side valley, which another effect beside it led out of."""
+
+    def leaves(found: frozenset[str]) -> dict[str, float]:
+        return {"b": 1.0, "c": 0.5} if found == {"a"} else {} if "a" in found else {"a": 1.0}
+
+    bench = Bench(monkeypatch, leaves)
+    monkeypatch.setattr(
+        bench, "fit", lambda start: candidate(start.names, {} if "a" in start.names else leaves(start.names))
+    )
+    search = bench.search()
+    assert search.tried[frozenset("a")].power < 0.7 * candidate("a", leaves(frozenset("a"))).power
+
+
+def test_exchanges_go_on_until_none_gains(monkeypatch: pytest.MonkeyPatch):
+    """From a pair that is proposed first to one that shares no effect with it, one effect at a time."""
+    order = ["ab", "ac", "cd"]
+    bench = Bench(monkeypatch, lambda found: {"e": 0.3 * (3 - order.index("".join(sorted(found))))}
+                  if "".join(sorted(found)) in order else {"e": 1.0})  # fmt: skip
+
+    def proposed(parent: frozenset[str], size: int) -> list[frozenset[str]]:
+        names = "".join(sorted(parent))
+        following = order[order.index(names) + 1 :][:1] if names in order else ["ab"]
+        return [frozenset(s) for s in following if len(s) == size]
+
+    bench.proposed = proposed
+    assert best(bench.search(), 2) == "cd"
 
 
 def test_no_set_is_larger_than_four(monkeypatch: pytest.MonkeyPatch):
