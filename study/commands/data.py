@@ -9,7 +9,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", help="record to look for, and to fetch if it is missing (default: list all)")
     parser.add_argument(
         "--address", default="",
-        help="address of the file, or of a folder with the files of the record under their names; checksums are verified",
+        help="address of the file, or of a folder with the record's files under their names; checksums are verified",
     )  # fmt: skip
 
 

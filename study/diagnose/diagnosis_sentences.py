@@ -18,7 +18,6 @@ from study.support.thresholds import ALPHA, UNSTEADY
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 NAMED = 3  # effects that cannot be told apart, before the others are counted
 CLOSE = 0.05  # families this close to the best one are named with it
-MUCH = 0.1  # of the rms response above the noise: what leaves more is no model of the record, whatever is missing
 
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -39,9 +38,9 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def misses_much(diagnosis: Diagnosis) -> bool:
-    """Whether a model of which no effect is missing leaves far more than noise all the same."""
-    return diagnosis.verdict == NOTHING and diagnosis.comparison.prediction.above_noise > MUCH
+def misses_much(diagnosis: Diagnosis, much: float = 0.1) -> bool:
+    """Whether a model of which no effect is missing leaves far more than noise, so much of the rms response."""
+    return diagnosis.verdict == NOTHING and diagnosis.comparison.prediction.above_noise > much
 
 
 def _nothing(diagnosis: Diagnosis) -> str:
