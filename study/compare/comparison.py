@@ -30,6 +30,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.rivals import best_first, rivals
 from study.identify.time_domain.smoothness import smoothed
+from study.identify.time_domain.step_moments import dated
 from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
@@ -186,7 +187,7 @@ def compare(
         fit, known = fit_by(estimator, model, prepared)
     if fit is None:
         fit, *alike = best_first(search or fit_model(model, prepared, start), prepared)
-        fit = smoothed(weighted(fit, prepared), prepared)
+        fit = smoothed(weighted(dated(fit, prepared), prepared), prepared)
     else:
         alike = rivals(fit, prepared)
     report("free run")

@@ -3,21 +3,23 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.ndimage import maximum_filter1d
 
 from study.equations import dimensions
 from study.equations.coefficient_units import coefficient_unit
-from study.equations.model import ModelTerm
+from study.equations.model import Model, ModelTerm
 from study.equations.variation import ALONG_TIME, STEP_AT
 from study.figures import page
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.smoothness import smoothness
+from study.identify.time_domain.smoothness import moved_by_finer_knots, smoothness
+from study.identify.time_domain.step_moments import moment_error
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.numbers import percent
@@ -49,6 +51,7 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
     """Every coefficient of a fitted model that varies; ``covariance`` is of its keys, shape (keys, keys)."""
     values, place = fit.model.numbers(), {key: i for i, key in enumerate(fit.keys)}
     taken = {one.entry.name: one.unknowns for one in smoothness(fit, prepared)}
+    finer, moved = moved_by_finer_knots(fit, prepared) if taken else (fit.model, {})
     found = list[VaryingCoefficient]()
     for entry in fit.model.terms:
         variation = entry.term.variation
@@ -67,12 +70,13 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
             fitted = [j for j, name in enumerate(own) if name in place]
             block = covariance[np.ix_([place[own[j]] for j in fitted], [place[own[j]] for j in fitted])]
             spread = np.einsum("ij,jk,ik->i", rows[:, fitted], block, rows[:, fitted])
+            if entry.name in taken and moved:
+                spread = spread + _left_out(finer, entry, key, i, moved, at) ** 2
             step = None
             if variation.shape == "step":
-                known = place.get(moment)
-                own_error = 0.0 if known is None else max(float(covariance[known, known]), 0.0)
+                own_error = moment_error(fit, prepared, moment) if moment in place else 0.0
                 # how long it takes is assumed: what steps at once may do so anywhere within
-                step = values[moment], float(np.sqrt(own_error + (variation.lasts or 0.0) ** 2 / 12.0))
+                step = values[moment], float(np.hypot(own_error, (variation.lasts or 0.0) / np.sqrt(12.0)))
             found.append(
                 VaryingCoefficient(
                     entry, key, variation.along, unit, at, rows @ np.array([values[name] for name in own]),
@@ -81,6 +85,20 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
                 )
             )  # fmt: skip
     return tuple(found)
+
+
+def _left_out(
+    finer: Model, entry: ModelTerm, key: str, component: int, moved: Mapping[str, float], at: Floats
+) -> Floats:
+    """How far finer knots move one coefficient of a curve, at most, within a knot's distance of each place."""
+    new = next(e for e in finer.terms if e.name == entry.name)
+    variation = new.term.variation
+    if variation is None:
+        return np.zeros(len(at))
+    each = len(variation.knots) - 1
+    own = new.symbols[component * each : (component + 1) * each]
+    shift = moved.get(key, 0.0) + variation.basis(at) @ np.array([moved[symbol] for symbol in own])
+    return np.asarray(maximum_filter1d(np.abs(shift), 4 * len(at) // each + 1), dtype=np.float64)
 
 
 def varying_in_words(one: VaryingCoefficient) -> str:

@@ -23,10 +23,10 @@ from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
+from study.support.thresholds import PROMISING
 
 FITTED = 12  # of many, those that promise most, whatever they are: fitted in free run ...
-AT_EACH_PLACE = 2  # ... with so many at each place that explain this share of what the best explains ...
-PROMISING = 0.3
+AT_EACH_PLACE = 2  # ... with so many at each place that explain ``PROMISING`` of what the best explains ...
 OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
 Progress = Callable[[int, int], None]  # called with how many candidates were fitted, and of how many
 ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.late_force import late_force
-from study.diagnose.varying_candidates import promise
 from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
@@ -42,9 +41,13 @@ def diagnose_accounted(
         return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
 
     first = found(accounted)
+    if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
+        accounted = accounted.with_all_faults()
+        first = found(accounted) if accounted.faults != first.accounted.faults else first
     removable = any(f.corrected and not _plain(f) for f in accounted.faults)
-    if removable and (first.diagnosis.verdict == UNKNOWN or may_change(accounted)):
-        first = _instead(first, found(accounted.corrected_for([f for f in accounted.faults if _plain(f)])))
+    if removable and first.diagnosis.verdict == UNKNOWN:
+        other = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
+        first = first if other.diagnosis.answer is None else other
     answer, faults = first.diagnosis.answer, first.accounted.faults
     if answer is None:
         return first
@@ -66,25 +69,6 @@ def diagnose_accounted(
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
-
-
-def may_change(accounted: Accounted) -> bool:
-    """Whether a coefficient may change along the record as it was given, which looks like many a fault."""
-    changes = promise(replace(accounted.comparison, prepared=accounted.given))
-    return changes is not None and changes.alone
-
-
-def _instead(first: Diagnosed, other: Diagnosed) -> Diagnosed:
-    """The diagnosis of a corrected record, or that without the corrections where it finds more.
-
-    Where both name something, the other names a change, and leaves less.
-    """
-    before, answer = first.diagnosis, other.diagnosis.answer
-    if answer is None or before.verdict == UNKNOWN:
-        return first if answer is None else other
-    least = before.comparison.prediction.error if before.answer is None else before.answer.response_error
-    changes = any(entry.term.variation for entry in answer.entries)
-    return other if changes and answer.response_error < least else first
 
 
 def _plain(fault: Fault) -> bool:

@@ -28,6 +28,7 @@ from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.promised_changes import PromisedChanges, promised_changes
 from study.identify.time_domain.shape_search import Baseline
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
@@ -58,6 +59,11 @@ class Diagnosis:
     def answer(self) -> Ranked | None:
         """The effect or the set of effects that is missing, the one that is known in part included."""
         return self.sets[0] if self.verdict in (MISSING, SEVERAL, PARTLY_KNOWN) else None
+
+    @property
+    def changes(self) -> bool:
+        """Whether a coefficient changes with what is named."""
+        return self.answer is not None and any(entry.term.variation for entry in self.answer.entries)
 
     @cached_property
     def included(self) -> dict[str, int]:
@@ -108,33 +114,56 @@ def diagnose(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
-    tried, promise, elsewhere = list[FittedCandidate](), varying_candidates.promise(comparison), 0
-    if promise is None or not promise.alone:
+    own, tried, elsewhere = comparison.fit.model.terms, list[FittedCandidate](), 0
+    changes = promised_changes(comparison.fit, comparison.prepared, own)
+    if changes is None or not changes.alone:
         tried = candidates.try_all(entries, base, progress)
-    if promise is not None and (promise.alone or promise.beside(tried)) and (suspect := promise.suspect()):
-        as_it_was = suspect.comparison is comparison
-        beside = base if as_it_was else search_base(suspect.comparison)
-        others = tried if tried and as_it_was else candidates.try_all(entries, beside, progress)
-        changes = varying_candidates.simplest(candidates.try_all(suspect.entries, beside, progress))
-        found = _diagnosis(suspect.comparison, beside, [*others, *changes], [*entries, *suspect.entries], progress)
-        named = () if found.answer is None else found.answer.entries
-        if as_it_was or any(entry.term.variation for entry in named):
-            return found  # else nothing that is named changes, and the record is judged as it was
-        elsewhere = len(changes)
+    if changes is not None and (changes.alone or varying_candidates.beside(tried, changes, comparison)):
+        other = _changing(changes, comparison, base, tried, entries, progress)
+        if other is not None and other.changes:
+            return other  # else nothing that is named changes, and the record is judged as it was
+        elsewhere = 0 if other is None else len(changes.shares)
     tried = tried or candidates.try_all(entries, base, progress)
     if (freed := _freed(comparison, base, tried)) is not None:
         return diagnose(freed, extra=extra, without=without, progress=progress)
-    return _diagnosis(comparison, base, tried, entries, progress, elsewhere)
+    found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
+    if elsewhere or found.verdict == NOTHING or not (named := [*found.sets, *found.candidates][:1]):
+        return found
+    # what changes may be the smaller part of what is missing, and seen beside the larger one alone
+    changes = promised_changes(named[0].fit, comparison.prepared, own)
+    other = None if changes is None else _changing(changes, comparison, base, tried, entries, progress, beside=True)
+    return found if other is None or not other.changes else other
+
+
+def _changing(
+    promised: PromisedChanges, comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate],
+    entries: Sequence[ModelTerm], progress: Progress | None, *, beside: bool = False,
+) -> Diagnosis | None:  # fmt: skip
+    """The diagnosis with changes that are promised, ``beside`` other effects perhaps; None where no model follows."""
+    suspect = varying_candidates.suspect(promised, comparison)
+    if suspect is None:
+        return None
+    as_it_was = suspect.comparison is comparison
+    base = base if as_it_was else search_base(suspect.comparison)
+    others = tried if tried and as_it_was else candidates.try_all(entries, base, progress)
+    changes = varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
+    both = [*entries, *suspect.entries]
+    return _diagnosis(suspect.comparison, base, [*others, *changes], both, progress, beside=beside)
 
 
 def _diagnosis(
     comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm],
-    progress: Progress | None, elsewhere: int = 0,
+    progress: Progress | None, elsewhere: int = 0, *, beside: bool = False,
 ) -> Diagnosis:  # fmt: skip
-    """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew."""
+    """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew.
+
+    ``beside`` what explains nearly all alone other effects are asked for too.
+    """
     asked = (len(entries) if base.several else len(tried)) + elsewhere
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    decision = _decide(rows, tried, entries, base, comparison, asked, progress)
+    decision = _decide(rows, tried, entries, base, comparison, asked, progress, beside=beside)
+    if decision.sets:
+        decision = _smooth(decision, comparison, asked)
     families: list[FamilyGain] = []
     if decision.verdict == UNKNOWN:
         families = dependence.families(dependence.unexplained(base))
@@ -198,17 +227,21 @@ class _Decision:
 
 def _decide(
     rows: list[Ranked], tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm], base: Baseline,
-    comparison: Comparison, asked: int, progress: Progress | None,
+    comparison: Comparison, asked: int, progress: Progress | None, *, beside: bool, search: SetSearch | None = None,
 ) -> _Decision:  # fmt: skip
-    """One effect that explains everything; else the set that does, as far as the record bears it."""
+    """One effect that explains everything; else the set that does, as far as the record bears it.
+
+    A ``search`` over sets that was made is not made again.
+    """
     prediction, own = comparison.prediction, held_out_of(comparison)
     first = next((r for r in rows if believed(r, prediction, own)), None)
     one, fewer_than = _of_one(first, rows, comparison, asked), None
     if one.verdict == NOTHING:
         return one
     # shapes of the motion see little of what is left in a drifting one: then a second effect is asked for all the same
-    if first is not None and one.verdict == MISSING and _nearly_all(first):
-        if first.unknowns <= 2 and not (first.flexible and one.left > TOLERANCE):
+    if first is not None and one.verdict == MISSING and _nearly_all(first) and not beside:
+        changing = any(c.term.variation for c in tried)
+        if first.unknowns <= 2 and not ((first.flexible or changing) and one.left > TOLERANCE):
             return one
         # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
         fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
@@ -217,11 +250,11 @@ def _decide(
     known = {c.name for c in tried}
     # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
     not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
-    search = searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
+    search = search or searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
     deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
     if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
         rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)
-        return _decide(rows, deeper, entries, base, comparison, asked, progress)
+        return _decide(rows, deeper, entries, base, comparison, asked, progress, beside=beside, search=search)
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
@@ -238,6 +271,17 @@ def _decide(
     if verdict != UNKNOWN:
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
     return _Decision(verdict, rows, left, good)
+
+
+def _smooth(decision: _Decision, comparison: Comparison, asked: int) -> _Decision:
+    """A decision whose answer has smooth curves where it was found with lines."""
+    answer = decision.sets[0]
+    again = varying_candidates.as_smooth(answer, comparison.prepared)
+    if again is answer:
+        return decision
+    row = replace(rank([again], comparison, asked)[0], tied_with=answer.tied_with, distance=answer.distance)
+    rows, sets = ([row if r is answer else r for r in listed] for listed in (decision.rows, decision.sets))
+    return replace(decision, rows=rows, sets=sets)
 
 
 def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, asked: int) -> _Decision:

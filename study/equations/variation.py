@@ -31,6 +31,7 @@ SIDES = {  # what part of the motion has the change, and what that is called in 
 }  # fmt: skip
 RATE_OF = {"u": "v", "u**3": "3*u**2*v", "u*abs(u)": "2*abs(u)*v"}  # of the shapes that a library term differentiates
 STEP_AT = "step_at"
+MOST_KNOTS = 40
 ABOUT = tuple(np.linspace(0.04, 0.96, 24).tolist())  # quantiles where a step is looked for
 
 
@@ -135,7 +136,7 @@ def _check_knots(variation: Variation, owner: str) -> None:
         lasts = variation.lasts
         expect(lasts is None or lasts > 0.0, f"{owner}: its step lasts {lasts}; expected a while above zero")
         return
-    most = 2 if variation.shape == "line" else 40
+    most = 2 if variation.shape == "line" else MOST_KNOTS
     wanted = f"expected 2{f' to {most}' if most > 2 else ''}"
     fits = len(knots) != 1 and len(knots) <= most
     expect(fits, f"{owner} has {len(knots)} knots; {wanted}, or none to have them laid along the record")

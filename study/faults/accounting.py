@@ -17,6 +17,7 @@ from study.faults.force_noise import force_noise
 from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover
 from study.faults.search import (
     FAR_APART,
+    PLAIN,
     Asked,
     Refined,
     SearchEnd,
@@ -31,6 +32,7 @@ from study.faults.seen_in_residual import mean_response, slow_response
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import delay_along_the_motion, has_lost_the_motion, seen_everywhere
+from study.identify.time_domain.promised_changes import promised_changes
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import FORCE, Prepared
@@ -40,6 +42,10 @@ from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
 NOT_ASKED_OF_MODES = "faults of the measurement are not looked for beside 'linear: modal'"
+PUT_OFF = (
+    "a coefficient seems to change along the record, which looks like many a fault of the measurement: diagnose looks "
+    "for those beside the change"
+)
 NOT_ASKED = "faults of the measurement were not looked for: that takes one unbroken stretch of a driven record"
 
 
@@ -53,6 +59,7 @@ class Accounted:
     known: Held  # values of faults that the user gave
     switched_off: tuple[str, ...]  # faults that are not looked for
     as_sampled: bool  # whether all samples are used
+    put_off: bool = False  # whether faults that a change of a coefficient looks like are yet to be looked for
 
     @classmethod
     def as_compared(cls, comparison: Comparison) -> "Accounted":
@@ -62,6 +69,11 @@ class Accounted:
     def faults_beside(self, fit: FreeRunFit, model: Model) -> "tuple[Fault, ...]":
         """The faults that the record shows beside a fuller model, which begins at a fit of it."""
         return _corrected(model, self.given, self.known, self.switched_off, self.as_sampled, near=fit).faults
+
+    def with_all_faults(self) -> "Accounted":
+        """The same with the faults looked for that were put off."""
+        model, known, off = self.comparison.model, self.known, self.switched_off
+        return _accounted(model, self.given, known, off, FREE_RUN, None, self.as_sampled, changes=False)
 
     def corrected_for(self, faults: Sequence[Fault]) -> "Accounted":
         """The comparison of the same model with the record corrected for other faults."""
@@ -78,6 +90,7 @@ class _Corrected:
     faults: tuple[Fault, ...]
     fit: FreeRunFit | None  # of the model to it, where there is one
     given: Prepared  # the record before that, with what is said of it
+    put_off: bool = False  # whether only faults were looked for that no change of a coefficient looks like
 
 
 def _needed(as_sampled: bool) -> Callable[[Prepared], Prepared]:
@@ -121,17 +134,28 @@ def accounted(
     StudyError
         If the model cannot be fitted.
     """
-    known = held or {}
-    found = _corrected(model, prepared, known, switched_off, as_sampled)
-    comparison = _compared(model, found.prepared, found.faults, found.fit, estimator, progress)
-    return Accounted(comparison, found.faults, found.given, known, tuple(switched_off), as_sampled)
+    return _accounted(model, prepared, held or {}, switched_off, estimator, progress, as_sampled, changes=True)
+
+
+def _accounted(
+    model: Model, prepared: Prepared, known: Held, switched_off: Sequence[str], estimator: str,
+    progress: Callable[[str], None] | None, as_sampled: bool, *, changes: bool,
+) -> Accounted:  # fmt: skip
+    found = _corrected(model, prepared, known, switched_off, as_sampled, changes=changes)
+    ready = replace(found.prepared, notes=(*found.prepared.notes, PUT_OFF)) if found.put_off else found.prepared
+    comparison = _compared(model, ready, found.faults, found.fit, estimator, progress)
+    off = tuple(switched_off)
+    return Accounted(comparison, found.faults, found.given, known, off, as_sampled, found.put_off)
 
 
 def _corrected(
     model: Model, prepared: Prepared, known: Held, switched_off: Sequence[str], as_sampled: bool,
-    near: FreeRunFit | None = None,
+    near: FreeRunFit | None = None, *, changes: bool = False,
 ) -> _Corrected:  # fmt: skip
-    """The record corrected for what is known and found of its faults; ``near`` is a fit where the search begins."""
+    """The record corrected for what is known and found of its faults; ``near`` is a fit where the search begins.
+
+    Where coefficients may change along the record (if ``changes`` are asked for), what looks like that is put off.
+    """
     given, begin = held_in(prepared, known), None
     if near is not None:
         values = near.model.numbers()
@@ -151,6 +175,7 @@ def _corrected(
     if not asked:
         return _Corrected(fewer, faults, None, prepared)
     late: Refined | None = None
+    put_off = False
     try:
         fit = fit_model(model, fewer, begin)
     except StudyError:  # forces and motion too far apart in time let a structure escape
@@ -163,18 +188,23 @@ def _corrected(
     else:
         lost = has_lost_the_motion(fit, fewer)
         told = tuple(one for one in asked if not (lost and one[0] in OF_THE_MOTION))
+        promised = promised_changes(fit, fewer, fit.model.terms) if changes and not lost else None
+        put_off = promised is not None and promised.alone
+        if put_off:
+            told = tuple(one for one in told if one[0] in PLAIN)
         end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
-        end = _beneath_too(model, prepared, fit, faults, asked, end)
-        if DELAY not in [fault.fault for fault in end.faults]:
+        if not put_off:
+            end = _beneath_too(model, prepared, fit, faults, asked, end)
+        if not put_off and DELAY not in [fault.fault for fault in end.faults]:
             late = _late_response(model, prepared, fit, faults, asked, needed)
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
-        return _Corrected(fewer, end.faults, fit, prepared)
+        return _Corrected(fewer, end.faults, fit, prepared, put_off)
     final = corrected(prepared, end.faults)
     kept = needed(final)
     best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
-    return _Corrected(kept, end.faults, best, prepared)
+    return _Corrected(kept, end.faults, best, prepared, put_off)
 
 
 def _beneath_too(

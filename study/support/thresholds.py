@@ -8,3 +8,4 @@ ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, wha
 NEARLY = 0.9  # of what an unphysical or wandering effect explains: one that is neither and explains so much comes first
 UNSTEADY = 0.3  # change of a coefficient, of itself, that is forgiven where a good model's own faults may move it
 BLOCKS = 48  # of time, over which residuals are compared
+PROMISING = 0.3  # of what is left, or of what the best explains: what promises so much is fitted

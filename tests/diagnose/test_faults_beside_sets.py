@@ -90,7 +90,6 @@ def diagnosed(
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
-    monkeypatch.setattr(confirmed_faults, "may_change", lambda _: False)
     return diagnose_accounted(record), len(made)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study.compare.comparison import compare
-from study.diagnose.candidates import PROMISING, elsewhere
+from study.diagnose.candidates import elsewhere
 from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.next_test import suggested
 from study.diagnose.verdict import diagnose
@@ -27,6 +27,7 @@ from study.records.readers import ReadOptions, read_record
 from study.records.record import Sensor, write_csv
 from study.records.record_layout import Layout
 from study.support.errors import StudyError
+from study.support.thresholds import PROMISING
 from study.way_in.compare_records import made_ready
 
 HERE = Path("twin.yaml")

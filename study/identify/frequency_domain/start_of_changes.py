@@ -15,19 +15,27 @@ from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
+from study.support.lowest import lowest
 
 
 def start_of_changes(model: Model, entry: ModelTerm, prepared: Prepared) -> dict[str, float]:
-    """Coefficients by :func:`along_the_equation`, and of a step the moment that leaves least, of those it may have."""
+    """Coefficients by :func:`along_the_equation`, and of a step the moment that leaves least.
+
+    Of those that it may have, then ever closer about the best: a step that is dated some periods wrong turns the phase
+    of all that follows, and no free run finds back from there.
+    """
     variation = entry.term.variation
     if variation is None or variation.shape != "step" or None not in entry.parameters:
         return along_the_equation(model, prepared)[0]
     moment = next(key for key in entry.keys if key.endswith(f".{STEP_AT}"))
     places = next(p.search.places for p in entry.term.parameters if p.name == STEP_AT)
     tried = np.quantile(variation.values(prepared.record)[slice(*prepared.plan.fit)], places)
-    found = [(along_the_equation(model.with_values({moment: float(at)}), prepared), float(at)) for at in tried]
-    (best, _), at = min(found, key=lambda one: one[0][1])
-    return best | {moment: at}
+
+    def left(at: float) -> float:
+        return along_the_equation(model.with_values({moment: at}), prepared)[1]
+
+    at = lowest(left, tried.tolist(), 0.5 * (variation.lasts or 0.0))
+    return along_the_equation(model.with_values({moment: at}), prepared)[0] | {moment: at}
 
 
 def along_the_equation(model: Model, prepared: Prepared) -> tuple[dict[str, float], float]:

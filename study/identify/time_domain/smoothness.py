@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.equations.laid_variations import laid_entry
-from study.equations.model import ModelTerm, free
-from study.equations.variation import roughness, varying
+from study.equations.model import Model, ModelTerm, free
+from study.equations.variation import MOST_KNOTS, Variation, roughness, varying
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.errors import StudyError
-from study.support.least_squares import length_or_one
+from study.support.least_squares import least_squares, length_or_one
 
 
 @dataclass(frozen=True)
@@ -53,29 +53,69 @@ def smoothed(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 def with_all_knots(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with curves of as many knots as a model that leaves these open has, where a search took fewer."""
-    model, start = fit.model, dict(fit.model.numbers())
-    for entry in fit.model.terms:
+    model = fit.model
+    for entry in _curves(fit):
         variation = entry.term.variation
-        if variation is None or len(variation.knots) < 3 or not set(entry.symbols) <= set(fit.keys):
+        new = (
+            None
+            if variation is None
+            else laid_entry(free(varying(replace(variation, knots=())), entry.place), prepared)
+        )
+        if variation is None or new is None or new.term.variation is None:
             continue
-        finer = laid_entry(free(varying(replace(variation, knots=())), entry.place), prepared)
-        new = finer.term.variation
-        if new is None or len(new.knots) <= len(variation.knots):
-            continue
-        curve = variation.basis(np.array(new.knots[1:])) @ np.array([start[symbol] for symbol in entry.symbols])
-        start |= dict(zip(finer.symbols, curve.tolist(), strict=True))
-        model = replace(model, terms=tuple(finer if e is entry else e for e in model.terms))
+        if len(new.term.variation.knots) > len(variation.knots):
+            model = with_curve(model, entry, new.term.variation)
     if model is fit.model:
         return fit
-    held, values = [k for k in fit.held if k in model.values], {k: v for k, v in start.items() if k in model.values}
+    held = [key for key in fit.held if key in model.values]
+    begun = np.atleast_2d(fit.initial) if fit.span == prepared.plan.fit else None
     try:
-        again = fit_part(
-            model.with_values(values), prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial)
-            if fit.span == prepared.plan.fit else None,
-        )  # fmt: skip
+        again = fit_part(model, prepared, held, steps=fit.steps_per_sample, initial=begun)
     except StudyError:
         return fit
     return replace(again, elsewhere=fit.elsewhere)
+
+
+def with_curve(model: Model, entry: ModelTerm, other: Variation) -> Model:
+    """A model in which a curve or a line goes through the same values on the knots of another."""
+    variation, values = entry.term.variation, model.numbers()
+    if variation is None:
+        return model
+    finer = free(varying(other), entry.place)
+    through, each = variation.basis(np.array(other.knots[1:])), len(variation.knots) - 1
+    amounts = np.array([values[symbol] for symbol in entry.symbols]).reshape(-1, each) @ through.T
+    finer = finer.with_values(dict(zip(finer.symbols, amounts.ravel().tolist(), strict=True)))
+    return replace(model, terms=tuple(finer if e is entry else e for e in model.terms))
+
+
+def moved_by_finer_knots(fit: FreeRunFit, prepared: Prepared) -> tuple[Model, dict[str, float]]:
+    """A model with twice as many knots to each curve, and by how much a step towards its minimum moves each estimate.
+
+    What that moves is what the knots of the fit leave out: splines of so many knots come no nearer to the truth,
+    however little noise there is. As smooth as the fit's own curves, by the integral of their squared second
+    derivatives.
+    """
+    model, weights, before = fit.model, list[float](), smoothness(fit, prepared)
+    for one in before:
+        variation = one.entry.term.variation
+        if variation is not None:
+            count = min(2 * len(variation.knots) - 1, MOST_KNOTS)
+            knots = np.linspace(variation.knots[0], variation.knots[-1], count).tolist()
+            model = with_curve(model, one.entry, replace(variation, knots=tuple(knots)))
+            weights.append(one.weight * ((count - 1) / (len(variation.knots) - 1)) ** 3)
+    keys = tuple(key for key in model.values if key not in fit.held)
+    numbers = model.numbers()
+    finer = replace(fit, model=model, keys=keys, values=np.array([numbers[key] for key in keys]))
+    rows = _rows(finer, _curves(finer), np.array(weights))
+    try:
+        columns = finer.whitened(linearise(finer, prepared))
+    except StudyError:
+        return fit.model, {}
+    beside = np.zeros((len(rows), columns.shape[1]))
+    beside[:, : len(keys)] = rows
+    target = np.concatenate([finer.whitened(fit.residual), -rows @ finer.values])
+    step = least_squares(np.vstack([columns, beside]), target, 1e-9)
+    return model, dict(zip(keys, step.tolist(), strict=False))
 
 
 def smoothness(fit: FreeRunFit, prepared: Prepared) -> tuple[Smoothness, ...]:

@@ -13,6 +13,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import continued, settled
 from study.identify.time_domain.smoothness import smoothed
+from study.identify.time_domain.step_moments import dated
 from study.records.outputs import Noise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
@@ -27,7 +28,7 @@ def finished(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit of a search as all that is shown rests on it: the whole fitting part, settled, weighted and smooth."""
     if (fit.noise or len(fit.penalty)) and fit.span == prepared.plan.fit:
         return fit
-    return smoothed(weighted(settled(continued(fit, prepared), prepared), prepared), prepared)
+    return smoothed(weighted(dated(settled(continued(fit, prepared), prepared), prepared), prepared), prepared)
 
 
 def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
