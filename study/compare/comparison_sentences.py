@@ -39,9 +39,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
         sentences += _of_equations(comparison)
     sentences += [varying_in_words(one).removesuffix(".") for one in comparison.varying]
     if not comparison.fit.converged:
-        sentences.append(
-            f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"
-        )
+        sentences.append(f"The fit did not arrive at a minimum ({comparison.fit.message}), so the fit may be at fault")
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
 
 
