@@ -81,7 +81,7 @@ wheel: $(READY)
 	$(BIN)/python -m build --wheel --outdir dist/built
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m auditwheel repair --wheel-dir dist dist/built/*.whl
 
-# TABLE: trials, trials_by_test, trials_of_structures, trials_like_rigs or trials_of_next_tests.
+# TABLE: trials, trials_by_test, trials_of_structures, trials_like_rigs, trials_of_next_tests or trials_of_changes.
 TABLE = trials
 trials: $(READY)
 	$(BIN)/snakemake -j2 $(TABLE)

@@ -1,13 +1,14 @@
 # Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials` (or trials_by_test, trials_of_structures,
-# trials_like_rigs, trials_of_next_tests), not part of `all`; `make trials TABLE=trials` writes docs/trials.csv, and what docs/tool.md says of them.
+# trials_like_rigs, trials_of_next_tests, trials_of_changes), not part of `all`; `make trials TABLE=trials` writes docs/trials.csv, and what docs/tool.md says of them.
 TRIALS = STUDY.settings.trials
 TRIAL_CODE = {name: modules(name) for name in ("trials", "trial_summary")}
-TRIAL_JOBS = {"trials": TRIALS.jobs, "trials_by_test": 10, "trials_of_structures": 12, "trials_like_rigs": 26, "trials_of_next_tests": 12}
+TRIAL_JOBS = {"trials": TRIALS.jobs, "trials_by_test": 10, "trials_of_structures": 12, "trials_like_rigs": 26, "trials_of_next_tests": 12, "trials_of_changes": 12}
 TRIAL_FIGURES = {
     "trials": ["trials_confusion", "trials_ladder"],
     "trials_by_test": [],
     "trials_like_rigs": [],
     "trials_of_next_tests": [],
+    "trials_of_changes": [],
     "trials_of_structures": ["trials_of_structures_effects", "trials_of_structures_places"],
 }
 TRIAL_RESULTS = {table: ["trials", "summary", *figures] for table, figures in TRIAL_FIGURES.items()}

@@ -98,7 +98,10 @@ def diagnosed_together(
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         found = diagnose_accounted(
-            accounted, extra=own, without=without, progress=lambda done, of: step("", max(of - done, 0))
+            accounted,
+            extra=own,
+            without=without,
+            progress=lambda done, of, what: step(f"{name}, {what}", max(of - done, 0)),
         )  # a set is searched, and a corrected record diagnosed, with counts of their own
     return found, separate
 

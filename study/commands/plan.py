@@ -67,7 +67,9 @@ def _run(arguments: argparse.Namespace) -> None:
     with progress(" steps", name=records[0].name) as step:
         accounted = accounted_together(arguments, model, records, arguments.records[0])
         diagnosis = diagnose_accounted(
-            accounted, without=tuple(arguments.without), progress=lambda done, of: step("diagnosing", max(of - done, 0))
+            accounted,
+            without=tuple(arguments.without),
+            progress=lambda done, of, what: step(f"diagnosing, {what}", max(of - done, 0)),
         ).diagnosis
         if arguments.precision:
             fit = (diagnosis.answer or diagnosis.comparison).fit

@@ -17,7 +17,7 @@ from study.compare.noise import segments_of
 from study.compare.prediction import Prediction
 from study.equations.model import Model
 from study.identify.frequency_domain import conditioned
-from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs, without_inertia
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs, with_known_changes, without_inertia
 from study.records.plan import FEWEST
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra, cross_spectra_within
@@ -74,7 +74,7 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     """Judge a fitted model in reverse on the judging part; a ``StudyError`` if it is too short for the inputs."""
     prepared, noise = prediction.prepared, prediction.of(0).noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
-    inputs = reverse_inputs(model)
+    inputs = with_known_changes(reverse_inputs(model), model)
     if prepared.free or not np.any(record["force"][first:last]):  # the inertia force is what the others balance
         inputs = without_inertia(inputs)
         record = record.with_channels({"force": -model.numbers()["m"] * record["acceleration"]})

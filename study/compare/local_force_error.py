@@ -15,7 +15,7 @@ from scipy.fft import rfft
 from study.compare.force_error import ForceError, from_noise, lines_to_judge
 from study.compare.prediction import Prediction
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs, with_known_changes
 from study.identify.frequency_domain.local_polynomial import (
     SPARE,
     Lines,
@@ -42,7 +42,8 @@ def local_force_error(model: Model, prediction: Prediction) -> ForceError:
         If the judging part is too short for two bands.
     """
     prepared, noise = prediction.prepared, prediction.of(0).noise
-    record, inputs = prepared.record.part(*prepared.inner(prepared.plan.judge)), reverse_inputs(model)
+    record = prepared.record.part(*prepared.inner(prepared.plan.judge))
+    inputs = with_known_changes(reverse_inputs(model), model)
     lines = transform([*histories(inputs, record), record["force"]], record.dt)
     local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE) // 2)
     index = _bands(lines, local, record.name)

@@ -28,7 +28,7 @@ from study.support.thresholds import PROMISING
 FITTED = 12  # of many, those that promise most, whatever they are: fitted in free run ...
 AT_EACH_PLACE = 2  # ... with so many at each place that explain ``PROMISING`` of what the best explains ...
 OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
-Progress = Callable[[int, int], None]  # called with how many candidates were fitted, and of how many
+Progress = Callable[[int, int, str], None]  # called with how many were fitted, of how many, and what: "sets of 3"
 ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 
@@ -184,7 +184,7 @@ def _fitted(
         if candidate is not None:
             done.append(candidate)
         if progress is not None:
-            progress(count, before + len(chosen))
+            progress(count, before + len(chosen), "single effects")
     return done
 
 

@@ -92,9 +92,9 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     at, value, error = list[float](), list[float](), list[float]()
     for a, b in pairwise(edges):
         rows = order[a:b]
-        if len(rows) < 2:
-            continue
         power = float(np.sum(own[rows]))
+        if len(rows) < 2 or power == 0.0:  # a stop that is not touched there
+            continue
         change = float(np.sum(cross[rows])) / power
         scatter: Floats = cross[rows] - change * own[rows]
         at.append((float(np.mean(own[rows])) / float(np.mean(own))) ** 0.5)

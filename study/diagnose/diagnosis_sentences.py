@@ -31,6 +31,8 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
             said = _several(diagnosis, diagnosis.sets[0])
         case _:
             said = _unknown(diagnosis)
+    if diagnosis.ended_at is not None:
+        said.append(f"The search was ended by hand at sets of {diagnosis.ended_at}: what is said is the best so far.")
     if diagnosis.answer is not None:
         said += [varying_in_words(one) for one in diagnosis.varying]
     if diagnosis.comparison.prediction.diverged:

@@ -4,8 +4,8 @@ A set of one size begins where the best of the size below ended; which are worth
 the reverse system. Effects come, go and change places with others: what a smaller set had, a larger one need not have.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -34,6 +34,7 @@ class SetSearch:
     entries: dict[str, ModelTerm]  # the effects and their places
     offered: dict[str, ModelTerm]  # the same with the shape parameters at which each was best alone
     tried: dict[frozenset[str], FittedCandidate] = field(default_factory=dict[frozenset[str], FittedCandidate])
+    ended_at: int | None = None  # effects in a set, at which the user ended the search
 
     def sets(self, size: int, *, simple: bool = False) -> list[FittedCandidate]:
         """Sets of so many effects, or simple ones, that were fitted; the best first, what is not physical last."""
@@ -48,7 +49,7 @@ class SetSearch:
                 names = frozenset(found.names)
                 self.tried[names] = min(found, self.tried.get(names, found), key=by_power)
             if progress is not None:
-                progress(count, len(listed))
+                progress(count, len(listed), f"sets of {max(len(start.names) for start in listed)}")
 
     def _fitted(self, start: SetStart) -> FittedCandidate | None:
         prepared, begun = self.base.prepared, self.base.fit if start.beside is None else start.beside.fit
@@ -94,7 +95,7 @@ def searched(
     ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley,
     ``not_alone`` simple ones beside which alone no motion stays finite. ``done`` says whether a set leaves nothing to
     be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple
-    effects with fewer are asked for.
+    effects with fewer are asked for. The user may end it (Ctrl-C): then what was fitted so far is there.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
     offered |= {entry.name: entry for entry in not_alone}
@@ -103,6 +104,19 @@ def searched(
     sizes = range(2, MOST + 1)
     search.fit(SetStart(frozenset(c.names), c.fit.model) for c in settled)
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
+    try:
+        _grow(search, reverse, sizes, done, fewer_than, progress)
+    except KeyboardInterrupt:  # what was found so far is there to be told
+        return replace(search, ended_at=max(map(len, search.tried), default=1))
+    return search
+
+
+def _grow(
+    search: SetSearch, reverse: Mapping[int, Sequence[SetStart]], sizes: Sequence[int],
+    done: Callable[[FittedCandidate], bool], fewer_than: int | None, progress: Progress | None,
+) -> None:  # fmt: skip
+    """Fit sets of growing size; ``reverse`` are those that the reverse system promises, by size."""
+    base, offered = search.base, search.offered
     best = next(iter(search.sets(1, simple=fewer_than is not None)), None)
     patient = True
     for size in sizes:
@@ -132,16 +146,14 @@ def searched(
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
     for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
-        search.fit(
-            [start_without(best, name) for name in best.names]
-        )  # beside others an effect may leave a side valley
+        # beside others an effect may leave a side valley
+        search.fit([start_without(best, name) for name in best.names])
         for name in (n for c in others for n in c.names):
             search.without(frozenset(others[0].names), name)
-    return search
 
 
-def _counted(progress: Progress, before: int, count: int, of: int) -> None:
-    progress(before + count, before + of)
+def _counted(progress: Progress, before: int, count: int, of: int, what: str) -> None:
+    progress(before + count, before + of, what)
 
 
 def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:

@@ -40,9 +40,15 @@ def beside(tried: Sequence[FittedCandidate], changes: PromisedChanges, compariso
 
 
 def suspect(changes: PromisedChanges, comparison: Comparison) -> Suspect | None:
-    """The changes that are worth a fit; None where the model does not follow the record laid out so."""
+    """The changes that are worth a fit; None where the model does not follow the record laid out so.
+
+    With what something changes the sensitivities tell: with time, or which channel. Where it is much, the coefficient
+    that promises most need not be the one that changes, so all are fitted that promise anything with that.
+    """
     prepared, fit = changes.prepared, comparison.fit
-    chosen = [entry for entry, share in changes.shares.items() if share >= PROMISING * changes.most]
+    worth = [entry for entry, share in changes.shares.items() if share >= PROMISING * changes.most]
+    along = {entry.term.variation.along for entry in worth if entry.term.variation}
+    chosen = [entry for entry in changes.shares if entry.term.variation and entry.term.variation.along in along]
     try:
         if prepared is not comparison.prepared:
             rough = fit_part(fit.model, prepared, fit.held, steps=rough_steps(fit.model, prepared, {}))

@@ -54,6 +54,7 @@ class Diagnosis:
     left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     sets: tuple[Ranked, ...]  # the answer, and all others that the record cannot tell from the best; empty without any
     families: tuple[FamilyGain, ...]  # what functions of displacement, ... explain of what has no name, best first
+    ended_at: int | None = None  # effects in a set, at which the user ended the search
 
     @property
     def answer(self) -> Ranked | None:
@@ -170,7 +171,14 @@ def _diagnosis(
     elif decision.verdict == PARTLY_KNOWN or (decision.verdict == SEVERAL and decision.left > GOOD):
         families = dependence.families(dependence.left_by(decision.sets[0].fit, comparison.prepared))
     return Diagnosis(
-        decision.verdict, comparison, tuple(decision.rows), asked, decision.left, tuple(decision.sets), tuple(families)
+        decision.verdict,
+        comparison,
+        tuple(decision.rows),
+        asked,
+        decision.left,
+        tuple(decision.sets),
+        tuple(families),
+        decision.ended_at,
     )
 
 
@@ -223,6 +231,7 @@ class _Decision:
     rows: list[Ranked]  # single effects in their final order
     left: float
     sets: list[Ranked]
+    ended_at: int | None = None  # effects in a set, at which the user ended the search
 
 
 def _decide(
@@ -258,19 +267,20 @@ def _decide(
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
-        return one
+        return replace(one, ended_at=search.ended_at)
     answer, left = _material(answer, sets, search, comparison)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
     if verdict == UNKNOWN and first is not None and _stands_out(first, comparison.prepared):
-        return replace(one, verdict=MISSING, rows=[first] + [r for r in rows if r is not first])
+        first_alone = [first] + [r for r in rows if r is not first]
+        return replace(one, verdict=MISSING, rows=first_alone, ended_at=search.ended_at)
     core = _necessary(good, search, comparison, asked) if verdict == UNKNOWN else None
     if core is not None and believed(core, prediction, own) and not core.wanders(asked):
         verdict, answer, left = PARTLY_KNOWN, core, _left(core.fit, core.prediction)
         good = [core, *(r for r in good if r.name != core.name)]
     if verdict != UNKNOWN:
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
-    return _Decision(verdict, rows, left, good)
+    return _Decision(verdict, rows, left, good, search.ended_at)
 
 
 def _smooth(decision: _Decision, comparison: Comparison, asked: int) -> _Decision:

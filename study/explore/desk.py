@@ -153,9 +153,9 @@ class Desk:
         if asked.now.diagnosis is not None and own is None:
             return
 
-        def count(done: int, of: int) -> None:
+        def count(done: int, of: int, what: str) -> None:
             self._still(model)
-            self._tell(diagnosing=f"diagnosing: {done} of {of} candidates tried")
+            self._tell(diagnosing=f"diagnosing: {done} of {of} tried, {what}")
 
         try:
             self._tell(diagnosing="diagnosing")

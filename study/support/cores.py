@@ -26,5 +26,8 @@ def side_by_side(
     hardest_first = sorted(range(len(items)), key=lambda i: -effort(items[i]) if effort else 0.0)
     with ThreadPoolExecutor(cores()) as pool:
         begun = {i: pool.submit(function, items[i]) for i in hardest_first}
-        for i in range(len(items)):
-            yield begun.pop(i).result()  # which nobody holds any longer
+        try:
+            for i in range(len(items)):
+                yield begun.pop(i).result()  # which nobody holds any longer
+        finally:  # where the user ends it, what has not begun is left
+            pool.shutdown(wait=False, cancel_futures=True)

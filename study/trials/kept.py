@@ -14,12 +14,14 @@ Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 LIKE_RIGS = "trials_like_rigs"
 NEXT_TESTS = "trials_of_next_tests"
+CHANGES = "trials_of_changes"
 TIMES = ("seconds",)  # of another machine, or another hour
 COLUMNS_OF_WORDS = (  # the others hold numbers
     "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
     "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
     "place_first", "tied", "tie_set", "tie_holds", "second_verdict", "second_tie_set", "whole_tie_set", "pair",
-    "remainder", "named", "sets", "design", "band", "sensor", "ends_in", "random_design", "random_band", "trouble",
+    "remainder", "named", "sets", "design", "band", "sensor", "ends_in", "random_design", "random_band", "of",
+    "trouble",
 )  # fmt: skip
 
 
@@ -67,6 +69,13 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "error_after", "error_true", "noise_floor", "seconds", "trouble",
             ),
             ("sets", "holds", "error_after", "error_true", "trouble"),
+        ),
+        CHANGES: KeptTable(
+            (
+                "test", "seed", "of", "change", "hidden", "noise", "verdict", "named", "right", "alike", "changes",
+                "held", "asked", "error_before", "error_after", "noise_floor", "seconds", "trouble",
+            ),
+            ("alike", "held", "asked", "error_after", "trouble"),
         ),
         NEXT_TESTS: KeptTable(
             (

@@ -16,7 +16,7 @@ from study.support.document import Block, Image, Text, table
 from study.trials import rates
 from study.trials.draw import make_trial
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
+from study.trials.kept import BY_TEST, CHANGES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
 from study.trials.runs import WITH, WITHOUT
 
 PAGES: Mapping[str, str] = MappingProxyType(
@@ -26,6 +26,7 @@ PAGES: Mapping[str, str] = MappingProxyType(
         STRUCTURES: "structures.md",
         LIKE_RIGS: "like_rigs.md",
         NEXT_TESTS: "next_test.md",
+        CHANGES: "tool.md",
     }
 )
 GROUP_HEADINGS: Mapping[str, str] = MappingProxyType({WITHOUT: "without faults", WITH: "with a fault", "": "reached"})
@@ -36,6 +37,7 @@ CONFUSIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         BY_TEST: {},
         LIKE_RIGS: {},
         NEXT_TESTS: {},
+        CHANGES: {},
         STRUCTURES: {
             "trials_of_structures_effects": "Effects: what was hidden and what was said",
             "trials_of_structures_places": "Places: where it was hidden and where it was found",

@@ -19,7 +19,7 @@ from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
-from study.trials.kept import BY_TEST, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
+from study.trials.kept import BY_TEST, CHANGES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
@@ -205,6 +205,14 @@ def _effects(*counts: int) -> Member:
     return lambda row: row["hidden"] != "" and (row["hidden"] != NONE) * (row["hidden"].count("+") + 1) in counts
 
 
+def _of_kinds(*tests: str) -> Member:
+    """Trials of changes of these kinds."""
+    return lambda row: row["test"] in tests
+
+
+_CHANGING = ("drift", "step", "schedule", "schedule_and_nonlinearity")
+
+
 def _promised(least: float, most: float = math.inf) -> Member:
     """Of ties that a test was proposed for: promised so much, and less than the other."""
     return lambda row: least <= row["promise"] < most
@@ -277,6 +285,21 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   _is("holds"), "holds"),
             Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
         ),
+        CHANGES: (
+            Reach("what is missing named rightly, where a coefficient changes", _of_kinds(*_CHANGING), _is("right"),
+                  "right"),
+            Reach("... a drift", _of_kinds("drift"), _is("right")),
+            Reach("... a step", _of_kinds("step"), _is("right")),
+            Reach("... a schedule by a channel", _of_kinds("schedule"), _is("right")),
+            Reach("... that beside a nonlinearity", _of_kinds("schedule_and_nonlinearity"), _is("right")),
+            Reach("... where a step and a curve along time count as one", _of_kinds(*_CHANGING), _is("alike")),
+            Reach("no change named where nothing varies", _of_kinds("nonlinear", "nothing"),
+                  lambda r: not _is("changes")(r), "steady"),
+            Reach("a nonlinearity alone named as such", _of_kinds("nonlinear"), _is("right")),
+            Reach("95 % bands, and moments of steps, that hold the truth", _asks("asked"), _number("held"), "held",
+                  asked="asked"),
+            Reach("... with noise", lambda r: _asks("asked")(r) and r["noise"] > 0.0, _number("held"), asked="asked"),
+        ),
         NEXT_TESTS: (
             Reach("ties that end in the right effect, where 95 % or more was promised", _promised(0.95), _is("decided"),
                   "sure"),
@@ -297,7 +320,7 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
 )  # fmt: skip
 # Columns of a page.
 GROUPS: Mapping[str, str] = MappingProxyType(
-    {TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: "", NEXT_TESTS: ""}
+    {TRIALS: "faults", BY_TEST: "test", STRUCTURES: "", LIKE_RIGS: "", NEXT_TESTS: "", CHANGES: ""}
 )
 WANTED: Mapping[str, Wanted] = MappingProxyType(
     {
@@ -305,6 +328,7 @@ WANTED: Mapping[str, Wanted] = MappingProxyType(
             "first": (0.9,), "first_in_noise": (0.8,), "tied": (0.95,), "nothing": (0.95,), "error": (0.9,),
             "held": (0.95,),
         },
+        CHANGES: {"right": (0.9,), "steady": (0.98,), "held": (0.95,)},
         NEXT_TESTS: {"sure": (0.9,), "likely": (0.8,)},
         LIKE_RIGS: {"two": (0.85,), "three": (0.75,), "there": (0.95,), "nothing": (0.98,), "holds": (0.95,)},
     }

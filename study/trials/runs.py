@@ -27,10 +27,11 @@ from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial,
 from study.trials.effect_sets import as_fitted, steady_ones, truth_of
 from study.trials.effects import HIDDEN
 from study.trials.findings import compared, intervals, tie_set
-from study.trials.kept import BY_TEST, KEPT_TABLES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
+from study.trials.kept import BY_TEST, CHANGES, KEPT_TABLES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row
 from study.trials.kinds import TESTS
 from study.trials.next_tests import judged_next_test
 from study.trials.rigs import RIG_KINDS
+from study.trials.varying import KINDS_OF_CHANGES, judged_varying, make_varying_trial
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
 PLANNED = "planned"  # of a test after a tie
@@ -60,6 +61,7 @@ def orders(table: str, settings: TrialSettings) -> list[Order]:
         BY_TEST: orders_of_tests,
         LIKE_RIGS: rig_orders,
         NEXT_TESTS: next_test_orders,
+        CHANGES: change_orders,
     }[table]()
 
 
@@ -141,6 +143,12 @@ def next_test_orders(count: int = 120, first: int = 640_001) -> list[Order]:
     ]  # fmt: skip
 
 
+def change_orders(first: int = 660_001, each: int = 20) -> list[Order]:
+    """So many trials of each kind in which a coefficient changes, or nothing does, the kinds in turns."""
+    kinds = KINDS_OF_CHANGES
+    return [Order("", first + i, None, None, None, test=kinds[i % len(kinds)]) for i in range(each * len(kinds))]
+
+
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
     judged = _judged_planned if order.kind == PLANNED else JUDGES.get(order.test, _judged_test)
@@ -153,7 +161,7 @@ def run_trial(order: Order) -> Row:
     begun = time.perf_counter()
     try:
         fault = FAULTS[order.seed % len(FAULTS)] if order.faults == WITH else NO_FAULT
-        trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, order.test, order.coordinates)
+        trial = _made(order, fault)
         shares = sum(trial.shares) if trial.test == STRUCTURE else "+".join(f"{share:.3f}" for share in trial.shares)
         row |= {
             **trial.about, "noise": trial.noise, "response": trial.response, "share": shares,
@@ -169,11 +177,18 @@ def run_trial(order: Order) -> Row:
     return {column: row.get(column, "") for column in KEPT_TABLES[table_of(order)].columns}
 
 
+def _made(order: Order, fault: str) -> Trial:
+    if order.test in KINDS_OF_CHANGES:
+        return make_varying_trial(order.test, order.seed)
+    return make_trial(order.seed, order.hidden, order.noise, order.response, fault, order.test, order.coordinates)
+
+
 def table_of(order: Order) -> str:
     """The kept table that a trial belongs to."""
     if order.kind == PLANNED:
         return NEXT_TESTS
-    return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES, **dict.fromkeys(RIG_KINDS, LIKE_RIGS)}.get(order.test, BY_TEST)
+    own = {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES, **dict.fromkeys(RIG_KINDS, LIKE_RIGS)}
+    return (own | dict.fromkeys(KINDS_OF_CHANGES, CHANGES)).get(order.test, BY_TEST)
 
 
 def _judged_driven(order: Order, trial: Trial) -> Row:
@@ -282,6 +297,15 @@ def _judged_rig(_: Order, trial: Trial) -> Row:
     }  # fmt: skip
 
 
+def _judged_change(_: Order, trial: Trial) -> Row:
+    return judged_varying(trial)
+
+
 JUDGES: Mapping[str, Callable[[Order, Trial], Row]] = MappingProxyType(
-    {DRIVEN_MASS: _judged_driven, STRUCTURE: _judged_structure, **dict.fromkeys(RIG_KINDS, _judged_rig)}
+    {
+        DRIVEN_MASS: _judged_driven,
+        STRUCTURE: _judged_structure,
+        **dict.fromkeys(RIG_KINDS, _judged_rig),
+        **dict.fromkeys(KINDS_OF_CHANGES, _judged_change),
+    }
 )

@@ -4,6 +4,7 @@ What varies is made by a force of its own in the time domain, not by the splines
 drifts, steps at once, a schedule that follows a channel evenly or in a bend.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -20,16 +21,18 @@ from study.records.record import Record
 from study.support.arrays import Floats
 from study.trials.draw import Trial
 from study.trials.effects import evenly_in_log, linear_oscillator
+from study.trials.kept import Row
 from study.way_in.compare_records import compare_records
 
 KINDS_OF_CHANGES = ("drift", "step", "schedule", "schedule_and_nonlinearity", "nonlinear", "nothing")
 NONLINEAR = ("cubic_stiffness", "quadratic_damping", "coulomb_friction", "quadratic_stiffness")
+NONE = "none"  # hidden
 ACTS_ON = {"linear_stiffness": "u", "linear_damping": "v"}
 
 
 def make_varying_trial(
     kind: str, seed: int, *, of: str | None = None, change: float | None = None, noise: float | None = None,
-    samples: int = 8192,
+    samples: int = 4096,
 ) -> Trial:  # fmt: skip
     """A trial of one of the kinds ``KINDS_OF_CHANGES``; what is given is not drawn.
 
@@ -106,24 +109,30 @@ def _nonlinear(rng: np.random.Generator, name: str, base: Model, record: Record)
     return replace(free(get(name)), coefficients=(share * spring / float(np.std(shape)),))
 
 
-def judged_varying(trial: Trial) -> dict[str, object]:
+def judged_varying(trial: Trial) -> Row:
     """What a diagnosis makes of a trial: whether it is right, and how much of the true curve its 95 % band holds.
 
     A step and a curve along time are one class where the record cannot tell them apart: ``alike`` is then true. The
     band is asked at nine places of what varies, and at the moment of a step.
     """
     found = diagnose_accounted(compare_records([trial.record], trial.believed)).diagnosis
-    named = set[str]() if found.answer is None else set(found.answer.names)
-    plain = {name.replace("_step", "") for name in named}
-    row: dict[str, object] = {
-        "trial": trial.record.name, "noise": trial.noise**0.5, **trial.about, "hidden": "+".join(trial.hidden),
-        "verdict": found.verdict, "named": "+".join(sorted(named)), "right": named == set(trial.hidden),
-        "alike": plain == {name.replace("_step", "") for name in trial.hidden}, "held": 0, "asked": 0,
+    answer, before = found.answer, found.comparison.prediction
+    named = set[str]() if answer is None else set(answer.names)
+    row: Row = {
+        "hidden": "+".join(trial.hidden) or NONE, "noise": trial.noise, "verdict": found.verdict,
+        "named": "+".join(sorted(named)), "right": int(named == set(trial.hidden)),
+        "alike": int(_plain(named) == _plain(trial.hidden)), "changes": int(found.changes), "held": 0, "asked": 0,
+        "error_before": before.error, "error_after": "" if answer is None else answer.response_error,
+        "noise_floor": before.floor,
     }  # fmt: skip
-    if found.answer is not None and named == set(trial.hidden):
+    if named == set(trial.hidden):
         inside = [x for one in found.varying for x in _held(one, trial)]
         row |= {"held": sum(inside), "asked": len(inside)}
     return row
+
+
+def _plain(names: Iterable[str]) -> set[str]:
+    return {name.replace("_step", "") for name in names}
 
 
 def _held(one: VaryingCoefficient, trial: Trial) -> list[bool]:

@@ -151,6 +151,41 @@ def test_simulate_takes_as_many_steps_as_the_fastest_mode_of_a_structure_asks_fo
     assert np.max(np.abs(one - other)[:, 2:]) < 1e-6 * np.max(np.abs(other[:, 2:]))
 
 
+OWN = """terms:
+  - {term: inertia, value: 1.0}
+  - {term: linear_damping, value: 1.0}
+  - {term: linear_stiffness, value: 355.3}
+  - {term: friction, force: "FRICTION", value: 0.2}
+"""
+
+
+def test_simulate_takes_as_many_steps_as_a_formula_of_the_users_asks_for() -> None:
+    """Dry friction that is rounded off within a tenth of a millimetre a second."""
+    Path("own.yaml").write_text(OWN.replace("FRICTION", "tanh(v/0.0001)"))
+    for words, name in (([], "usual.csv"), (["--steps", "256"], "finer.csv"), (["--steps", "8"], "eight.csv")):
+        assert cli.main(["simulate", "own.yaml", "--samples", "2048", "--out", name, *words]) == 0
+    usual, finer, eight = (read_csv(Path(f"{n}.csv"))["displacement"] for n in ("usual", "finer", "eight"))
+    assert np.std(usual - finer) < 2e-3 * np.std(finer) < np.std(eight - finer)
+
+
+def test_simulate_switches_where_a_formula_of_the_users_jumps() -> None:
+    """The report's integrator, which does not, shifts such a motion by percents."""
+    Path("own.yaml").write_text(OWN.replace("FRICTION", "sign(v)*(1 + exp(-(v/0.005)**2))"))
+    for words, name in (([], "usual.csv"), (["--steps", "256"], "finer.csv")):
+        assert cli.main(["simulate", "own.yaml", "--samples", "2048", "--out", name, *words]) == 0
+    usual, finer = (read_csv(Path(f"{n}.csv")) for n in ("usual", "finer"))
+    reports = simulate(read_model(Path("own.yaml")), usual["force"], 0.02)
+    size = np.std(finer["displacement"])
+    assert np.std(usual["displacement"] - finer["displacement"]) < 1e-3 * size
+    assert np.std(reports["displacement"] - finer["displacement"]) > 1e-2 * size
+
+
+def test_simulate_says_where_no_number_of_steps_gives_the_motion(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["simulate", str(Path(DUFFING).parent / "dead_band.yaml"), "--samples", "4096", "--out", "chaotic.csv"]
+    assert cli.main(words) == 0
+    assert "with twice as many as the 8 steps a sample a motion changes by" in capsys.readouterr().out
+
+
 BAD = {
     "no_command": ([], "COMMAND"),
     "unknown_command": (["simulat"], "'simulat'"),

@@ -34,6 +34,21 @@ def rig(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_a_term_that_raises_the_error_is_added_only_where_that_is_asked_for(rig, capsys):
+    """Little is fitted, so that what is superfluous takes up noise there."""
+    model, words = rig / "rig.yaml", ["--data", "rig.csv", "--fit", "0:300", "--judge", "600:4000", "--out", "found"]
+    before = model.read_bytes()
+    assert cli.main(["add", "rig.yaml", "quintic_stiffness", *words]) == 0
+    said = capsys.readouterr().out
+    assert "Quintic stiffness raises the error of what was not fitted, from" in said
+    assert "rig.yaml is left as it was" in said
+    assert model.read_bytes() == before
+    assert not (rig / "found").exists()
+    assert not history.read_history(model)
+    assert cli.main(["add", "rig.yaml", "quintic_stiffness", "--anyway", *words]) == 0
+    assert model.read_text().endswith("  - quintic_stiffness\n")
+
+
 def test_diagnose_add_history(rig, capsys):
     assert cli.main(["diagnose", "rig.csv", "--model", "rig.yaml", "--out", "found"]) == 0
     found = json.loads((rig / "found" / "diagnosis.json").read_text())

@@ -79,12 +79,14 @@ class Bench:
             for n in sizes
         }
 
-    def search(self, *, done: bool = False, fewer_than: int | None = None, lost: str = "") -> SetSearch:
+    def search(
+        self, *, done: bool = False, fewer_than: int | None = None, lost: str = "", progress: Any = None
+    ) -> SetSearch:
         """``lost`` are effects whose fit alone has no finite motion."""
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES if name not in lost]
         not_alone = [effect(name) for name in lost]
         base: Any = None
-        return searched(base, singles, [], not_alone, lambda _: done, fewer_than)
+        return searched(base, singles, [], not_alone, lambda _: done, fewer_than, progress)
 
     def sizes(self) -> set[int]:
         """Of the sets of several effects."""
@@ -139,6 +141,22 @@ def test_an_effect_alone_is_fitted_again_from_where_a_set_with_it_ended(monkeypa
     )
     search = bench.search()
     assert search.tried[frozenset("a")].power < 0.7 * candidate("a", leaves(frozenset("a"))).power
+
+
+def test_what_the_user_ends_leaves_the_best_so_far(monkeypatch: pytest.MonkeyPatch):
+    told: list[str] = []
+
+    def progress(_done: int, _of: int, what: str) -> None:
+        told.append(what)
+        if what == "sets of 3":
+            raise KeyboardInterrupt
+
+    search = Bench(monkeypatch, hidden("abd")).search(progress=progress)
+    assert search.ended_at == 3
+    assert search.sets(2)
+    assert told[-1] == "sets of 3"
+    assert "sets of 2" in told
+    assert Bench(monkeypatch, hidden("abd")).search().ended_at is None
 
 
 def test_exchanges_go_on_until_none_gains(monkeypatch: pytest.MonkeyPatch):

@@ -67,9 +67,22 @@ def test_an_effect_explains_more_than_what_is_left_or_goes(monkeypatch: pytest.M
     search: Any = SimpleNamespace(tried=sets, without=lambda names, name: sets.get(names - {name}))
     monkeypatch.setattr(verdict, "_left", lambda *_: left)
     rows: Any = list(sets.values())
-    answer, beside = verdict._material(sets[frozenset("abc")], rows, search, NOTHING_YET)
+    comparison: Any = SimpleNamespace(prediction=SimpleNamespace(error=0.5))
+    answer, beside = verdict._material(sets[frozenset("abc")], rows, search, comparison)
     assert "".join(answer.names) == kept
     assert beside == left
+
+
+@pytest.mark.parametrize(("before", "kept"), [(0.3, "a"), (0.02, "ab")])
+def test_an_effect_that_explains_next_to_nothing_goes(monkeypatch: pytest.MonkeyPatch, before: float, kept: str):
+    """It explains 0.5 % of the response: of 30 % that are unexplained that is next to nothing, of 2 % it is not."""
+    sets = {frozenset(names): a_set(names, error) for names, error in {"ab": 0.01, "a": 0.01118, "b": before}.items()}
+    search: Any = SimpleNamespace(tried=sets, without=lambda names, name: sets.get(names - {name}))
+    monkeypatch.setattr(verdict, "_left", lambda *_: 0.0)
+    rows: Any = list(sets.values())
+    comparison: Any = SimpleNamespace(prediction=SimpleNamespace(error=before))
+    answer, _ = verdict._material(sets[frozenset("ab")], rows, search, comparison)
+    assert "".join(answer.names) == kept
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,7 @@ class Input:
     parameters: tuple[tuple[str, float], ...]  # shape parameters in the formula
     state: str | None = None  # dz/dt, where the shape is a state z with a memory
     direction: tuple[float, ...] = ()  # weights of the coordinates in the motion u of the shape
+    joined: tuple[tuple[float, "Input"], ...] = ()  # so much of others that it is the sum of; then it has no formula
 
     @property
     def linear(self) -> bool:
@@ -106,6 +107,23 @@ def _collected(acting: Iterable[tuple[ModelTerm, tuple[float, ...], float]]) -> 
     return tuple(inputs.values())
 
 
+def with_known_changes(inputs: Sequence[Input], model: Model) -> tuple[Input, ...]:
+    """Inputs with each change of a coefficient as one, of the shape that was found in free run.
+
+    A curve of many knots would ask for more averages than most records have. Its coefficient is that of its largest
+    change, and what it has of the others is known.
+    """
+    values, found = model.numbers(), list(inputs)
+    for entry in (e for e in model.terms if e.term.variation is not None and len(e.symbols) > 1):
+        own = [item for item in found if {part.symbol for part in item.parts} <= set(entry.symbols)]
+        amounts = [sum(values[p.symbol] * p.factor for p in item.parts) for item in own]
+        most = max(range(len(own)), key=lambda i: abs(amounts[i]))
+        shares = (x / amounts[most] if amounts[most] else float(i == most) for i, x in enumerate(amounts))
+        one = replace(own[most], joined=tuple(zip(shares, own, strict=True)))
+        found = [one if item is own[most] else item for item in found if item is own[most] or item not in own]
+    return tuple(found)
+
+
 def without_inertia(inputs: Sequence[Input]) -> tuple[Input, ...]:
     """The inputs without the mass: where no force acts, its inertia force is what the others have to balance."""
     rest = (replace(i, parts=tuple(p for p in i.parts if p.order < INERTIA)) for i in inputs)
@@ -128,6 +146,8 @@ def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
 
 def input_history(item: Input, record: Record) -> Floats:
     """g(u, v, t) of one input along a record, shape (n,); a state begins at zero."""
+    if item.joined:
+        return np.asarray(sum(share * input_history(part, record) for share, part in item.joined), dtype=np.float64)
     from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
     from study.equations.motion_program import memory_program
 
