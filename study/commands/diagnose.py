@@ -31,7 +31,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
     """What is asked for beside the effects of the library, and what is not."""
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA",
-        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter that is fitted",
+        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 
@@ -95,8 +95,11 @@ def diagnosed_together(
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         found = diagnose_accounted(
-            accounted, extra=own, without=without, progress=lambda _, total, what: step(f"{name}, {what}", total)
-        )
+            accounted,
+            extra=own,
+            without=without,
+            progress=lambda done, of, what: step(f"{name}, {what}", max(of - done, 0)),
+        )  # a set is searched, and a corrected record diagnosed, with counts of their own
     return found, separate
 
 

@@ -18,7 +18,7 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     steps = history.read_history(arguments.model)
     if not steps:
-        print(f"{arguments.model}: nothing was added yet; 'study add' begins the history")
+        print(f"{arguments.model}: nothing was added yet; 'study add' starts the history")
         return
     print(history.history_table(steps))
     if arguments.out is not None:
@@ -34,6 +34,6 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 COMMAND = Command(
-    "history", "every model so far, its error, the noise floor",
+    "history", "all models so far, with error and noise floor",
     "study history rig.yaml\n  study history rig.yaml --out results/rig", _arguments, _run,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""``study plan``: which test decides between what a record cannot tell apart, or tells a value closely."""
+"""``study plan``: which test would decide between effects that are tied, or tells a value closely."""
 
 import argparse
 import re
@@ -70,7 +70,7 @@ def _run(arguments: argparse.Namespace) -> None:
         diagnosis = diagnose_accounted(
             accounted,
             without=tuple(arguments.without),
-            progress=lambda _, total, what: step(f"diagnosing, {what}", total),
+            progress=lambda done, of, what: step(f"diagnosing, {what}", max(of - done, 0)),
         ).diagnosis
         if arguments.precision:
             fit = (diagnosis.answer or diagnosis.comparison).fit
@@ -87,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 COMMAND = Command(
-    "plan", "which test decides between what a record cannot tell apart",
+    "plan", "which test would decide between effects that are tied",
     "study plan rig.csv --model rig.yaml --max-force 40 --max-displacement 0.02 --max-length 120\n"
     "  study plan rig.csv --model rig.yaml --precision k3=5% --max-force 40  # which test tells k3 to 5 %?\n"
     "  study plan frame.csv --model frame.yaml --max-force 200  # a structure: which sensor, too",

@@ -38,7 +38,7 @@ def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
     most = max(places, key=lambda link: link.share, default=None)
     about, width = "nothing that is left depends on the motion anywhere", max(WIDE, drawn.width)
     if most is not None:
-        about = f"glowing most: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
+        about = f"brightest: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
     figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: where a force is missing", f"model {comparison.model.name}; {about}",
         width=width, panel=(width - 1.04) * drawn.height / drawn.width, legend_rows=0, headed=False,
