@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 STUDY_READY := $(VENV)/.ready-study
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures report_picture next_test notebooks docs gallery readme estimators trials benchmarks wheel clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures howto_pictures report_picture next_test notebooks docs gallery readme estimators trials benchmarks wheel clean
 
 study: $(STUDY_READY)
 	$(BIN)/snakemake -j2
@@ -43,6 +43,9 @@ picture: $(READY)
 
 fault_pictures: $(READY)
 	$(BIN)/python scripts/fault_pictures.py models docs/faults
+
+howto_pictures: $(READY)
+	$(BIN)/python scripts/howto_pictures.py models docs/howto
 
 report_picture: $(READY)
 	$(BIN)/python scripts/report_picture.py models docs/report.png

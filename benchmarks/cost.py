@@ -49,7 +49,8 @@ def measure(largest: int, rounds: int) -> Measured:
 
 
 def table(measured: Measured) -> str:
-    """Markdown: seconds, time a sample as a ratio to the reference, memory in megabytes."""
+    """Markdown, the largest record of each task: seconds, time a sample as a ratio to the reference, megabytes."""
+    largest = {(task, max(size for other, size in measured if other == task)) for task, _ in measured}
     rows = [
         "| task | samples | processor time (s) | time a sample, beside 1e5 | peak memory (MB) |",
         "|---|--:|--:|--:|--:|",
@@ -57,6 +58,8 @@ def table(measured: Measured) -> str:
     for (task, size), (seconds, memory) in sorted(
         measured.items(), key=lambda item: ([*NAMES].index(item[0][0]), item[0][1])
     ):
+        if (task, size) not in largest:
+            continue
         ratio = seconds / size / (measured[task, REFERENCE][0] / REFERENCE)
         rows.append(f"| {NAMES[task]} | {size:,} | {seconds:.2g} | {ratio:.2f} | {memory / 1e6:.0f} |")
     return "\n".join(rows)

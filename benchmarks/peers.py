@@ -27,6 +27,7 @@ EXACT = Integrator("rk4", 16)  # finer than the study's, so that the record's ow
 NOISES = {"clean": 0.0, "5 % noise": 0.05}  # rms of the noise over that of the displacement
 METHODS = {**PEERS, **OURS}
 KEYS, NUMBERS = ["seed", "record", "method"], [*WANTED, "s"]
+WORST = f"worst of {', '.join(WANTED)}"
 WARM_UP = 2048  # samples of a first run that is not timed
 
 
@@ -62,9 +63,15 @@ def measure(model: Model, samples: int, seeds: int, path: Path) -> pd.DataFrame:
 
 
 def table(measured: pd.DataFrame) -> pd.DataFrame:
-    """Medians over the seeds, a row a method, columns by kind of record and number; nan is nothing found or not run."""
-    middle = measured.groupby(["method", "record"])[NUMBERS].median().unstack("record")
-    return middle.reindex(index=[*METHODS], columns=[(number, kind) for kind in NOISES for number in NUMBERS])
+    """The worst coefficient's error and the time, medians over the seeds: a row a method, columns by kind of record.
+
+    nan is nothing found or not run.
+    """
+    middle = measured.groupby(["method", "record"])[NUMBERS].median()
+    middle[WORST] = middle[[*WANTED]].max(axis=1, skipna=False)
+    return middle.unstack("record").reindex(
+        index=[*METHODS], columns=[(number, kind) for kind in NOISES for number in (WORST, "s")]
+    )
 
 
 def shown(middle: pd.DataFrame) -> str:

@@ -12,16 +12,14 @@ from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 
-def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> None:
+def main(page: Path, table: Path, picture: Path) -> None:
     for path in (table, picture):
         if not path.is_file():
             raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 estimators' first")
     errors = pd.read_csv(table)
     for mark, block in {
-        "sentences": document.Bullets(study_pages.error_sentences(errors, noise)),
         "about": document.Text(study_pages.about_errors(errors)),
         "errors": study_pages.error_overview(errors),
-        "bias": study_pages.bias_overview(errors, noise),
     }.items():
         document.put(page, mark, [block])
     replace_file(page.with_suffix(".png"), picture.read_bytes())
@@ -30,9 +28,5 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
 
 if __name__ == "__main__":
     with one_sentence():
-        study = load_config(Path("config"))
-        stem = f"estimators_{study.settings.estimator_errors.many}"
-        main(
-            Path("docs/estimators.md"), Path(f"results/{stem}.csv"), Path(f"figures/{stem}.png"),
-            study.noise,
-        )  # fmt: skip
+        stem = f"estimators_{load_config(Path('config')).settings.estimator_errors.many}"
+        main(Path("docs/estimators.md"), Path(f"results/{stem}.csv"), Path(f"figures/{stem}.png"))

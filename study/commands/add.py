@@ -24,7 +24,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--shape", choices=("curve", "line", "step"), default="curve", help="how (default: %(default)s)"
     )
     parser.add_argument(
-        "--only", choices=("v > 0", "v < 0", "u > 0", "u < 0"), default="", help="for one side of the motion alone"
+        "--only", choices=("v > 0", "v < 0", "u > 0", "u < 0"), default="", help="for one side of the motion only"
     )
     parser.add_argument("--anyway", action="store_true", help="add it even where it raises the error")
     add_revision_arguments(parser, "two coordinates, or 'ground' and one")

@@ -24,12 +24,12 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, help="folder whose records were measured of rigs of one kind")
+    parser.add_argument("folder", type=Path, help="folder of records of one rig, or of rigs of one kind")
     parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
     parser.add_argument(
         "--by", choices=("record", "level", "date"), default="record",
-        help="what the records stand in the order of: their names (default), the level of the response, or the day in "
-        "each name, as in rig_2026-03-01.csv",
+        help="order of the records: by name (default), by the level of the response, or by the day in the name, as in "
+        "rig_2026-03-01.csv",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, help="folder for results (default results/FOLDER)")
     add_reading_arguments(parser)
@@ -40,8 +40,10 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.support.document import document_page
     from study.support.errors import StudyError, expect
+    from study.support.extras import needed
     from study.support.files import check_folder, write_files
 
+    needed("matplotlib", "'study campaign'", "pictures")
     records, folder = _records_in(arguments.folder), arguments.out
     out: Path = folder if folder is not None else RESULTS / (arguments.folder.resolve().name or "campaign")
     check_folder(out)
@@ -51,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> None:
     found, refused, reused = list[Measured](), dict[str, str](), 0
     with progress(" records", len(records)) as step:
         for number, path in enumerate(records, 1):
-            step(f"{path.stem} ({number} of {len(records)})", len(records))
+            step(f"{path.stem} ({number} of {len(records)})", len(records) - number)
             digest, place = _digest(arguments, path), out / path.stem
             kept = _kept(place, digest)
             try:
@@ -74,7 +76,7 @@ def _records_in(folder: Path) -> list[Path]:
     from study.records.readers import SUFFIXES
     from study.support.errors import expect
 
-    expect(folder.is_dir(), f"{folder}: this is no folder; expected one with records, or 'study compare' for a file")
+    expect(folder.is_dir(), f"{folder}: this is not a folder; expected one with records, or 'study compare' for a file")
     found = sorted(p for p in folder.iterdir() if p.is_file() and p.suffix.lower() in (*TEXTS, *SUFFIXES))
     expect(found, f"{folder}: there is no record in it; expected files such as rig.csv, rig.mat or rig.h5")
     stems = [path.stem for path in found]

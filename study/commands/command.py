@@ -24,8 +24,8 @@ class Command:
 class Step(Protocol):
     """Counts a step of some work, of so many where that is known."""
 
-    def __call__(self, doing: str, of: int | None = None) -> None:
-        """A step more, in which this is done."""
+    def __call__(self, doing: str, to_come: int | None = None) -> None:
+        """A step more, in which this is done; so many are still to come, as far as that is known."""
 
 
 @contextmanager
@@ -39,16 +39,22 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
     # progress is shown after two seconds of work
     with tqdm(total=total, delay=2.0, leave=False, unit=unit, desc=harmless(name) or None) as bar:
 
-        def step(doing: str, of: int | None = None) -> None:
+        def step(doing: str, to_come: int | None = None) -> None:
             if doing:
                 bar.set_description(harmless(doing), refresh=False)
-            if of is not None:
-                bar.total = of
+            if to_come is not None:
+                bar.total = bar.n + 1 + to_come
             elif bar.total is not None:
                 bar.total = max(bar.total, bar.n + 2)  # this step and one that is still to come
             bar.update()
 
         yield step
+
+
+def say_left_out(*why: str) -> None:
+    """Say in one line what was left out, and why: sentences of ``extras.lacking``, empty where nothing lacks."""
+    if any(why):
+        print(f"Left out: {'; '.join(sentence for sentence in why if sentence)}.")
 
 
 def finite_number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:

@@ -6,13 +6,10 @@ from study.commands.command import Command
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "name", nargs="?", help="a record to look for, and to fetch where it is missing: a list if left out"
-    )
+    parser.add_argument("name", nargs="?", help="record to look for, and to fetch if it is missing (default: list all)")
     parser.add_argument(
         "--address", default="",
-        help="where the file is to be fetched from, or the folder that holds the files of a record by their names; its "
-        "checksum is verified",
+        help="address of the file, or of a folder with the record's files under their names; checksums are verified",
     )  # fmt: skip
 
 

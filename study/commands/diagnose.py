@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command, progress
+from study.commands.command import Command, progress, say_left_out
 from study.commands.record_arguments import (
     accounted_together,
     add_each_record_argument,
@@ -31,7 +31,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
     """What is asked for beside the effects of the library, and what is not."""
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA",
-        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter that is fitted",
+        help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 
@@ -45,6 +45,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.support.errors import expect
+    from study.support.extras import undrawn
     from study.support.files import write_files
 
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
@@ -58,6 +59,7 @@ def _run(arguments: argparse.Namespace) -> None:
         files |= {prefix + name: data for name, data in _diagnosed(model, [record], path, arguments, own).items()}
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
+    say_left_out(_no_page(), undrawn())
 
 
 def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Record]]":
@@ -93,8 +95,11 @@ def diagnosed_together(
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         found = diagnose_accounted(
-            accounted, extra=own, without=without, progress=lambda _, total, what: step(f"{name}, {what}", total)
-        )
+            accounted,
+            extra=own,
+            without=without,
+            progress=lambda done, of, what: step(f"{name}, {what}", max(of - done, 0)),
+        )  # a set is searched, and a corrected record diagnosed, with counts of their own
     return found, separate
 
 
@@ -140,11 +145,16 @@ def _diagnosed(
     return files | _page(found, unneeded)
 
 
-def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
-    """What is missing, of a structure place by place, as a page to look at; none without what draws it."""
+def _no_page() -> str:
+    """Why there can be no page, in a sentence; empty where there can."""
     from study.support.extras import lacking
 
-    if lacking("bokeh", PAGE, "explore"):
+    return lacking("bokeh", PAGE, "explore")
+
+
+def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
+    """What is missing, of a structure place by place, as a page to look at; none without what draws it."""
+    if _no_page():
         return {}
     from study.explore.saved import of_diagnosis
 

@@ -25,7 +25,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser, out="folder that Save writes to")
     add_each_record_argument(parser)
     parser.add_argument("--port", type=whole_number(0, 65535), help="of the page; 0 for any (default 5006 if free)")
-    parser.add_argument("--no-browser", action="store_true", help="say the address and open nothing")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -46,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> None:
     try:
         serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))
     except KeyboardInterrupt:
-        print("\nended; what was not saved is gone")
+        print("\nclosed; anything not saved is lost")
 
 
 def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -> "Session":

@@ -18,12 +18,15 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     steps = history.read_history(arguments.model)
     if not steps:
-        print(f"{arguments.model}: nothing was added yet; 'study add' begins the history")
+        print(f"{arguments.model}: nothing was added yet; 'study add' starts the history")
         return
     print(history.history_table(steps))
     if arguments.out is not None:
-        from study.compare.history_picture import history_files
+        from study.support.extras import DRAWING, needed
         from study.support.files import check_folder, write_files
+
+        needed(*DRAWING)
+        from study.compare.history_picture import history_files
 
         check_folder(arguments.out)
         found = history_files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}
@@ -31,6 +34,6 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 COMMAND = Command(
-    "history", "every model so far, its error, the noise floor",
+    "history", "all models so far, with error and noise floor",
     "study history rig.yaml\n  study history rig.yaml --out results/rig", _arguments, _run,
 )  # fmt: skip

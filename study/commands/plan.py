@@ -1,9 +1,9 @@
-"""``study plan``: which test decides between what a record cannot tell apart, or tells a value closely."""
+"""``study plan``: which test would decide between effects that are tied, or tells a value closely."""
 
 import argparse
 import re
 
-from study.commands.command import Command, finite_number, progress
+from study.commands.command import Command, finite_number, progress, say_left_out
 from study.commands.record_arguments import (
     accounted_together,
     add_record_arguments,
@@ -57,6 +57,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.separation import limits_asked, rivals_of
     from study.equations import terms
     from study.equations.model_file import read_model
+    from study.support.extras import undrawn
     from study.support.files import write_files
 
     folder, model = out_folder(arguments), read_model(arguments.model)
@@ -69,7 +70,7 @@ def _run(arguments: argparse.Namespace) -> None:
         diagnosis = diagnose_accounted(
             accounted,
             without=tuple(arguments.without),
-            progress=lambda _, total, what: step(f"diagnosing, {what}", total),
+            progress=lambda done, of, what: step(f"diagnosing, {what}", max(of - done, 0)),
         ).diagnosis
         if arguments.precision:
             fit = (diagnosis.answer or diagnosis.comparison).fit
@@ -82,10 +83,11 @@ def _run(arguments: argparse.Namespace) -> None:
             words, files = deciding_plan(next_test(rivals, limits, sensors=arguments.sensor, progress=step))
     write_files(folder, files, inputs_of(arguments))
     print(f"{words}\n\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
+    say_left_out("" if arguments.precision else undrawn())
 
 
 COMMAND = Command(
-    "plan", "which test decides between what a record cannot tell apart",
+    "plan", "which test would decide between effects that are tied",
     "study plan rig.csv --model rig.yaml --max-force 40 --max-displacement 0.02 --max-length 120\n"
     "  study plan rig.csv --model rig.yaml --precision k3=5% --max-force 40  # which test tells k3 to 5 %?\n"
     "  study plan frame.csv --model frame.yaml --max-force 200  # a structure: which sensor, too",

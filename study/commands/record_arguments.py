@@ -38,7 +38,10 @@ def add_record_arguments(
     parser.add_argument("records", type=Path, nargs=nargs, metavar="RECORD", help="CSV, MATLAB, HDF5, UFF or Parquet")
     add_reading_arguments(parser)
     parser.add_argument(
-        "--model", type=Path, required=True, help="model file (YAML); values in it are held, but those with held: false"
+        "--model",
+        type=Path,
+        required=True,
+        help="model file (YAML); values in it are held, except those with held: false",
     )
     add_out_argument(parser, out)
 
@@ -66,7 +69,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument("--unit", action="append", default=[], metavar="ROLE=UNIT", help="such as force=kN")
     reading.add_argument(
         "--scale", action="append", default=[], metavar="ROLE=FACTOR",
-        help="factor on the numbers of a column: -1 for a force of the wrong sign; --unit is then that of the product",
+        help="factor on the numbers of a column: -1 for a force of the wrong sign; --unit is that of the product",
     )  # fmt: skip
     rate = reading.add_mutually_exclusive_group()
     rate.add_argument("--fs", type=finite_number(above=0.0), help="sampling rate in Hz, if there is no column of times")
@@ -91,7 +94,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--free", action="store_true", help="a free decay: no force acts, and a column of it is ignored"
     )
     reading.add_argument(
-        "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
+        "--no-measurement",
+        action="store_true",
+        help="do not look for faults of the measurement: drift, delay, spikes ...",
     )
     judging = parser.add_argument_group("fitting and judging")
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
@@ -102,27 +107,28 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=time_span, default=[], metavar="S:T",
-        help="use the record from S to T seconds alone; several such stretches are fitted and judged together",
+        help="use only the record from S to T seconds; several such stretches are fitted and judged together",
     )  # fmt: skip
-    judging.add_argument("--response", choices=MOTIONS, help="the measured motion that free runs are held against")
+    judging.add_argument("--response", choices=MOTIONS, help="the measured motion that free runs are compared with")
     judging.add_argument(
         "--cutoff", type=finite_number(above=0.0), metavar="HZ",
         help="integrate measured accelerations above this frequency and judge nothing below (default: from the record)",
     )  # fmt: skip
     judging.add_argument(
         "--horizon", type=finite_number(above=0.0), metavar="S",
-        help="of a mass without a spring, whose motion drifts: fit and judge it over S seconds from a state of its own "
-        "(default: some periods of its motion)",
+        help="for a mass without a spring, whose motion drifts: fit and judge it in pieces of S seconds (default: some "
+        "periods of its motion)",
     )  # fmt: skip
 
     judging.add_argument(
         "--near", type=finite_number(above=0.0), metavar="HZ",
-        help="of a record that shows several modes, the one near this frequency: the fit of a single mass begins there",
+        help="start the fit of a single mass at the mode near this frequency, where the record shows several",
     )  # fmt: skip
 
     judging.add_argument(
         "--up-to", type=finite_number(above=0.0), metavar="HZ",
-        help="use what lies below this frequency alone, where a record shows modes that the model does not have",
+        help="use only what lies below this frequency, where the record shows modes that the model lacks: force and "
+        "motion fade out up to twice it",
     )  # fmt: skip
 
 

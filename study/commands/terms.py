@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", help="a term to show in detail, or a word of some: all if left out")
+    parser.add_argument("name", nargs="?", help="a term to show in detail, or a word to search for (default: all)")
 
 
 def _run(arguments: argparse.Namespace) -> None:

@@ -16,15 +16,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     task.add_argument("--seed", type=whole_number(0, 2**63 - 1), help="the same seed gives the same trial")
     task.add_argument("--open", type=Path, metavar="FILE", help="show the sealed answer of a trial")
     parser.add_argument(
-        "--hidden", metavar="NAMES", help="'none', or one or more effects (a,b) to hide; drawn if left out"
+        "--hidden", metavar="NAMES", help="'none', or one or more effects (a,b) to hide; random if left out"
     )
     parser.add_argument(
         "--noise",
         type=finite_number(least=0.0, most=1.0),
-        help="mean square of the noise over that of the response (0.05 is 5 %%); drawn if left out",
+        help="mean square of the noise over that of the response (0.05 is 5 %%); random if left out",
     )
     parser.add_argument(
-        "--response", choices=("displacement", "velocity", "acceleration"), help="what is measured; drawn if left out"
+        "--response", choices=("displacement", "velocity", "acceleration"), help="what is measured; random if left out"
     )
     parser.add_argument(
         "--fault", default="none", metavar="NAME",
@@ -32,14 +32,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--test", metavar="KIND",
-        help="another kind of test than a force on mass and spring: free_decay, blows, base, component or axis; or a "
+        help="a kind of test other than a force on mass and spring: free_decay, blows, base, component or axis; or a "
         "rig with several effects and a remainder: rig_noise, rig_multisine, rig_sweep, rig_stepped, rig_blows, "
         "rig_decay, rig_axis, rig_component or rig_structure",
     )  # fmt: skip
     parser.add_argument(
         "--coordinates",
         type=whole_number(2, 5),
-        help="a structure of so many masses, its effect hidden at one of its places",
+        help="a structure with this many masses; the effect is hidden at one of its places",
     )
     parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder (default: this one)")
 
@@ -76,7 +76,7 @@ def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
 
 
 COMMAND = Command(
-    "trial", "write a practice record with a hidden effect, its answer in a file apart",
+    "trial", "write a practice record with a hidden effect, and the answer to a separate file",
     "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
     "  study trial --seed 8 --fault any\n"
     "  study trial --seed 9 --test free_decay\n"

@@ -43,13 +43,13 @@ STEPS = 5  # reports of progress a record
 Progress = Callable[[str], None]
 Value = tuple[float, float, str]  # value, standard error (not a number where it was held), unit
 CHAOTIC = (
-    "the fitted system magnifies disturbances, as a chaotic one does: one free run would lose the measured motion "
-    "however true the model, so it is fitted and judged in segments, each from a state of its own"
+    "the fitted system amplifies disturbances like a chaotic one: a single free run would lose the measured motion "
+    "even with the true model, so it is fitted and judged in segments, each from its own state"
 )
 
 ASTRAY = (
     "no single free run of this model follows the motion, so it is fitted and judged in segments, each from a state of "
-    "its own: a term is missing, or the channels are not what they are taken for"
+    "its own: a term is missing, or the channels are not what they seem"
 )
 
 
@@ -218,7 +218,7 @@ def _of_a_structure(fit: FreeRunFit) -> list[str]:
         return []
     loose = loose_motions(fit.model) if not (fit.model.prescribed or fit.model.modal) else 0
     drifts = f"nothing ties the structure down in {loose} of its motions: it may drift away as a whole"
-    unclear = f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}"
+    unclear = f"this record does not show, or cannot tell apart, {', '.join(fit.undecided)}"
     return [drifts if loose else "", unclear if fit.undecided else ""]
 
 

@@ -15,7 +15,7 @@ from study.compare.decay import decays_of
 from study.compare.fitted_coefficients import Level
 from study.compare.force_map import curve, surface
 from study.compare.place_pictures import place_figures, responses_figure
-from study.compare.varying_coefficients import varying_figure
+from study.compare.varying_pictures import varying_figure
 from study.equations.place import place_in_words
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence

@@ -36,9 +36,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
         sentences += _of_equations(comparison)
     sentences += [varying_in_words(one).removesuffix(".") for one in comparison.varying]
     if not comparison.fit.converged:
-        sentences.append(
-            f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"
-        )
+        sentences.append(f"The fit did not arrive at a minimum ({comparison.fit.message}), so the fit may be at fault")
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
 
 
@@ -65,20 +63,20 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
         start += f", most at {comparison.worst.sensor} ({percent(comparison.worst.error)})"
     if comparison.prediction.error >= HOPELESS:
         # more than one is more than no motion at all would leave
-        like = "as one" if comparison.prediction.error < 1.1 else "more than one"
+        like = "as a model" if comparison.prediction.error < 1.1 else "more than a model"
         return (
-            f"{start}, {like} without any motion would: it cannot follow this record, and its fitted coefficients "
+            f"{start}, {like} that never moves would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
     noises = [view.noise for view in comparison.views]
     if all(noise.alone for noise in noises):
         source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
-        return f"{start}, and that is noise{source}: nothing stands above the noise floor of {floor}{doubt}"
+        return f"{start}, which is noise{source}: nothing is above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= NEGLIGIBLE:
         return (
             f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.above_noise)} of "
-            "the response, too little to call anything missing"
+            "the response, too little to say that anything is missing"
         )
     return f"{start}, where noise alone would leave {floor}"
 
@@ -105,7 +103,7 @@ def _of_equations(comparison: Comparison) -> list[str]:
     if np.any(missing.rms > 0.0):
         i = int(np.argmax(missing.rms))
         name = missing.equations[i]
-        left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms are left of its forces"
+        left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms of its forces remain"
         said.append(f"the equation of {name} is violated most: {left}")
     place, share = missing.aligned[0]
     if len(comparison.views) > 1 and share > 0.0:
@@ -126,11 +124,11 @@ def _grows(growths: Growths | None) -> str:
     """The best power, as far as it stands out."""
     if growths is None or growths.ways[0].share < EXPLAINS:
         best = "" if growths is None else f" (the best explains {percent(max(growths.ways[0].share, 0.0))})"
-        return f"no power of displacement or velocity accounts for it{best}"
+        return f"no power of displacement or velocity explains it{best}"
     best = growths.ways[0]
     rivals = [w for w, margin in zip(growths.ways[1:], growths.margins[1:], strict=True) if margin < TOLD_APART]
     rivals = [w for w in rivals if w.share > EXPLAINS]
-    share = "" if best.share > 0.95 else f", which accounts for {percent(best.share)} of it"
+    share = "" if best.share > 0.95 else f", which explains {percent(best.share)} of it"
     if not rivals:
         return f"it {_growth(best)}{share}"
     others = " or ".join(_short(w) for w in rivals)

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from study.compare import panels, place_panels
 from study.compare.comparison import Comparison
-from study.compare.dependence import explained_by_place
+from study.compare.place_sketch import sketch_of
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
-from study.figures.sketch import Sketch, sketch
+from study.figures.sketch import Sketch
 from study.figures.sketch_drawing import structure_sketch
 from study.support.numbers import percent
 
@@ -32,21 +32,13 @@ def place_figures(comparison: Comparison) -> dict[str, Figure]:
     }  # fmt: skip
 
 
-def sketch_of(comparison: Comparison) -> Sketch:
-    """The sketch of a structure.
-
-    A connection glows with the held-out share of what is left that general functions of its own motion explain.
-    """
-    return sketch(comparison.model, comparison.missing.coordinates, explained_by_place(comparison.leftovers))
-
-
 def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
     """The sketch on a page."""
     places = [link for link in drawn.links if link.share > 0.0]
     most = max(places, key=lambda link: link.share, default=None)
     about, width = "nothing that is left depends on the motion anywhere", max(WIDE, drawn.width)
     if most is not None:
-        about = f"glowing most: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
+        about = f"brightest: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
     figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: where a force is missing", f"model {comparison.model.name}; {about}",
         width=width, panel=(width - 1.04) * drawn.height / drawn.width, legend_rows=0, headed=False,

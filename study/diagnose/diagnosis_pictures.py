@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from study.compare.place_pictures import modes, sketch_of, structure_figure
-from study.compare.varying_coefficients import varying_figure
+from study.compare.place_pictures import modes, structure_figure
+from study.compare.varying_pictures import varying_figure
+from study.diagnose.diagnosis_sketch import sketch_of_diagnosis
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.labels import term_names
-from study.figures.sketch import Sketch, sketch
 from study.figures.styles import in_style
 from study.support.numbers import percent
 
@@ -38,18 +38,6 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
             if not comparison.model.prescribed:
                 drawn["modes"] = modes(comparison, sets)
         return page.image_files(drawn)
-
-
-def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
-    """The sketch of a structure, glowing where an effect that is found, or tied with it, explains what is left."""
-    comparison = diagnosis.comparison
-    if diagnosis.answer is None:
-        return sketch_of(comparison)
-    shares: dict[frozenset[str], float] = {}
-    for row in diagnosis.sets:
-        for entry in row.entries:
-            shares.setdefault(entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
-    return sketch(comparison.model, comparison.missing.coordinates, shares)
 
 
 def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:

@@ -28,7 +28,7 @@ def candidate_table(diagnosis: Diagnosis) -> str:
     more, unfitted = len(diagnosis.candidates) - len(listed), diagnosis.asked - len(diagnosis.candidates)
     said = [f"... and {more} more, in diagnosis.json"] if more > 0 else []
     said += [_why_this_order(diagnosis)] if _contradicts([row for _, row in listed]) else []
-    said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to be fitted"] if unfitted else []
+    said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to fit"] if unfitted else []
     return "\n".join([shown, "; ".join(said)]) if said else shown
 
 
@@ -39,7 +39,7 @@ def _contradicts(rows: Sequence[Ranked]) -> bool:
 
 def _why_this_order(diagnosis: Diagnosis) -> str:
     named = "what is named first, then " if diagnosis.answer is not None else ""
-    return f"in order of {named}what is left of both parts of the record; 'explains' is of the judged part alone"
+    return f"ordered by {named}what is left of both parts of the record; 'explains' counts the judged part only"
 
 
 def shown_rows(diagnosis: Diagnosis) -> list[tuple[int, Ranked]]:
@@ -60,9 +60,12 @@ def _shown(number: int, row: Ranked) -> list[str]:
 
 
 def explained_share(gain: Gain) -> str:
-    """What an effect explains with its standard error, where that reaches the digits shown."""
-    if gain.explained < -1.0:  # of what leaves twice as much as there was, how much more matters to nobody
-        return "below -100 %"
+    """What an effect explains with its standard error, where that reaches the digits shown.
+
+    By how much a model is worse with an effect matters to nobody.
+    """
+    if gain.explained < -max(gain.error, 0.05):
+        return "worse"
     if gain.error < 5e-4:
         return percent(gain.explained, "z.1f")
     return percent(gain.explained, "z.1f", gain.error, ".1f")

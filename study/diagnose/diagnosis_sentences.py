@@ -40,10 +40,23 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
+def misses_much(diagnosis: Diagnosis, much: float = 0.1) -> bool:
+    """Whether a model of which no effect is missing leaves far more than noise, so much of the rms response."""
+    return diagnosis.verdict == NOTHING and diagnosis.comparison.prediction.above_noise > much
+
+
 def _nothing(diagnosis: Diagnosis) -> str:
     comparison = diagnosis.comparison
     where = " at any place" if comparison.model.named else ""
     asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
+    if misses_much(diagnosis):
+        prediction = comparison.prediction
+        return (
+            f"No known effect is missing, but the model does not describe this record: the error of "
+            f"{_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
+            f"{percent(prediction.floor)}. None of {asked} explains any of it. Other modes may show, or a force that "
+            "was not measured: --near and --up-to choose one mode, 'linear: modal' in the model file takes several."
+        )
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
         f"{percent(comparison.prediction.error)}, and what is left looks like noise: it depends neither on the motion"
@@ -87,7 +100,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     ]
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
-        said.append(f"{percent(diagnosis.left)} of the response is left beside it that is no noise.")
+        said.append(f"{percent(diagnosis.left)} of the response is still unexplained beside it, and is not noise.")
     if first.unphysical:
         said.append(f"As fitted it is not physical: {first.unphysical}.")
     if first.tied_with:
@@ -158,7 +171,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
             f"{percent(shares[0][1])} of what is unexplained, held out."
         )
     else:
-        said.append("None of displacement, velocity, the past or time explains a tenth of it.")
+        said.append("Neither displacement, velocity, the past nor time explains a tenth of it.")
     return said
 
 

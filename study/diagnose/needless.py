@@ -97,7 +97,7 @@ def needless_in_words(found: Sequence[Needless], any_more: bool = False, complet
     """What to tell of all of them; empty if there are none. ``complete`` is false where an effect is missing."""
     said = [n.sentence(any_more) for n in found]
     if found and not complete:
-        said.append("That holds while something is missing: ask again when it is added.")
+        said.append("Ask again once the missing effect is added.")
     return " ".join(said)
 
 

@@ -20,6 +20,7 @@ from study.records.interpolation import between_samples
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Floats
+from study.support.extras import undrawn
 from study.support.numbers import enumerated, percent
 
 
@@ -37,7 +38,7 @@ def next_test_in_words(found: NextTest) -> str:
     needs = "" if choice.sensor is None else f", with {_sensor_in_words(choice.sensor)} measured"
     words = [f"{test[0].upper()}{test[1:]}{needs}, decides between {names} with {_sure(choice.promise)}"]
     again = None if found.again is None or _same(found.again, choice) else found.again
-    words[0] += "." if again is None else f"; as was, {_sure(again.promise)}."
+    words[0] += "." if again is None else f"; a repetition of this record's test, {_sure(again.promise)}."
     if choice.promise < DECIDES:
         words.append(f"Of {found.asked} tests within the limits none decides with {percent(DECIDES)}.")
         level = [
@@ -46,12 +47,12 @@ def next_test_in_words(found: NextTest) -> str:
             if i != j and choice.pairs[i, j] < 0.1
         ]  # fmt: skip
         if level:
-            words.append(f"It would not tell, if the first is true, {enumerated(level)}.")
+            words.append(f"If the first of a pair is true, it would not tell {enumerated(level)}.")
     if not choice.rehearsed and choice.promise >= WORTH:
-        words.append("That is by sensitivities alone: the test cannot be rehearsed together with this record.")
+        words.append("That rests on sensitivities alone: the test cannot be rehearsed together with this record.")
     if choice.sensor is not None:
         words.append(
-            "That counts on noise in the same proportion to the motion as now; diagnose its record by itself "
+            "That assumes noise in the same proportion to the motion as now; diagnose its record by itself "
             f"(--response {choice.sensor.motion}), as this one has no such sensor."
         )
     return " ".join(words)
@@ -132,7 +133,7 @@ def precise_test_in_words(found: PreciseTest) -> str:
     """Which test tells a value as closely as is wanted."""
     test = design_in_words(found.design, found.present)
     said = f"{test[0].upper()}{test[1:]}, brings the 95 % interval of {found.key} to +- {percent(found.width)} of it"
-    again = "" if math.isnan(found.again) else f"; as was again, +- {percent(found.again)}"
+    again = "" if math.isnan(found.again) else f"; a repetition of this record's test, +- {percent(found.again)}"
     said += f" (now +- {percent(found.now)}{again})."
     if found.width > found.wanted:
         said += f" Of {found.asked} tests within the limits none brings it to {percent(found.wanted)}."
@@ -187,14 +188,17 @@ def precise_test_fields(found: PreciseTest) -> dict[str, Any]:
 
 def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
     """A test that decides: what to print, and the content of its files."""
-    from study.diagnose.next_test_pictures import next_test_pictures  # which would make the page begin later
-
     said, rivals = next_test_in_words(found), found.rivals
     driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"))
     scale, files = _plan_files(
         next_test_fields(found) | promise_fields(found), said, found.limits, driven, rivals.prepared
     )
-    return f"{pair_table(found)}\n\n{said}{scale}", files | next_test_pictures(found)
+    told = f"{pair_table(found)}\n\n{said}{scale}"
+    if undrawn():
+        return told, files
+    from study.diagnose.next_test_pictures import next_test_pictures  # which would make the page begin later
+
+    return told, files | next_test_pictures(found)
 
 
 def precise_plan(found: PreciseTest) -> tuple[str, dict[str, bytes]]:

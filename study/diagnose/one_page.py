@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.adding import added_candidate
 from study.diagnose.diagnosis_files import all_names, diagnosis_in_words
-from study.diagnose.diagnosis_sentences import digits_between, effect_in_words
+from study.diagnose.diagnosis_sentences import digits_between, effect_in_words, misses_much
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
@@ -55,6 +55,10 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
     if diagnosis.verdict == "partly_known":
         effects += " is" if one else " are"
     headline = HEADLINES[diagnosis.verdict].format(effects=effects)
+    if misses_much(diagnosis):
+        headline = (
+            f"No known effect is missing, but the model misses {percent(before.prediction.error)} of the response"
+        )
     shown = after or before
     rows = [
         (c.key, term_names(c.term), *_value_and_interval(c), c.unit)
@@ -100,11 +104,11 @@ def _in_brackets(formula: str) -> str:
 
 def _how_sure(diagnosis: Diagnosis) -> str:
     """What chance does, and what was asked for."""
-    asked = f"{diagnosis.asked} effects {'at places ' if diagnosis.comparison.model.named else ''}were asked for."
+    asked = f"{diagnosis.asked} effects {'at places ' if diagnosis.comparison.model.named else ''}were tried."
     if diagnosis.answer is None:
         return asked
     chance = max(diagnosis.answer.p_value, 1e-12)
-    return f"Chance explains such a gain with a probability of {chance:.1g} or less; {asked}"
+    return f"The probability that chance alone gains as much is {chance:.1g} or less; {asked}"
 
 
 def _errors(before: Comparison, after: Comparison | None) -> tuple[tuple[str, str, str], ...]:

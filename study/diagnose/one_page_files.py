@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextToPath
 
 from study.compare.prediction import SensorPrediction
 from study.diagnose.one_page import OnePage
@@ -23,7 +22,6 @@ from study.figures.styles import in_style
 from study.records.spectra import Segments, cross_spectra_within
 from study.support.arrays import Floats
 
-TEXT_TO_PATH = TextToPath()
 PRINTED = """\
 @page { size: A4; margin: 14mm }
 body { font: 9.5pt/1.35 system-ui, sans-serif; color: #111; max-width: 182mm; margin: 0 auto }
@@ -39,8 +37,8 @@ def one_page_files(content: OnePage) -> dict[str, bytes]:
     """``report.html`` and ``report.pdf``."""
     with in_style():
         picture = Figure(figsize=(_Sheet.inner(), 2.5))
-        draw(list(picture.subplots(1, 2, gridspec_kw={"wspace": 0.28}).flat), content)
-        picture.subplots_adjust(left=0.105, right=0.99, bottom=0.17, top=0.84)
+        draw(list(picture.subplots(1, 2, gridspec_kw={"wspace": 0.3}).flat), content)
+        picture.subplots_adjust(left=0.13, right=0.99, bottom=0.17, top=0.84)
         drawn = page.rendered(picture, "svg")
         return {"report.html": as_html(content, drawn), "report.pdf": page.rendered(sheet(content), "pdf")}
 
@@ -221,7 +219,7 @@ def lines(words: str, font: FontProperties, width: float) -> list[str]:
     found, line = list[str](), ""
     for word in words.split():
         longer = f"{line} {word}".strip()
-        if line and TEXT_TO_PATH.get_text_width_height_descent(longer, font, ismath="$" in longer)[0] / 72.0 > width:
+        if line and page.text_width(longer, font) > width:
             found.append(line)
             longer = word
         line = longer

@@ -45,7 +45,7 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
         if any(sensor.coordinate for sensor in record.sensors):
             lacking = [name for name in term.channels if name not in record]
             has = f"the record has {', '.join(record.extra) or 'none beside forces and motions'}"
-            expect(not lacking, f"--candidate {term.name}: no channel is called {', '.join(lacking)}; {has}")
+            expect(not lacking, f"candidate {term.name}: no channel is called {', '.join(lacking)}; {has}")
             continue
         formula = term.components[0].shape
         try:
@@ -56,7 +56,7 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
                 if term.name in item.terms:
                     input_history(item, record)
         except StudyError as error:
-            raise StudyError(f"--candidate {term.heading}={formula}: {error}") from None
+            raise StudyError(f"candidate {term.heading}={formula}: {error}") from None
 
 
 def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:

@@ -80,7 +80,7 @@ _TERMS = (
     ),
     _single(
         "cubic_stiffness", "k3", "u**3", formula="u^3",
-        meaning="hardening (or, if negative, softening) spring", cause="stretching of a clamped beam, mooring lines",
+        meaning="spring that hardens, or softens where negative", cause="stretching of a clamped beam, mooring lines",
         either_sign=True,
     ),
     _single(

@@ -15,9 +15,7 @@ from bokeh.resources import Resources
 
 from study.compare import history
 from study.compare.comparison import Comparison
-from study.compare.comparison_pictures import comparison_pictures, level_pictures
 from study.compare.comparison_report import as_json, comparison_document, tables
-from study.compare.history_picture import history_files as history_pictures
 from study.diagnose.confirmed_faults import Diagnosed
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.needless import Needless
@@ -28,6 +26,7 @@ from study.explore.html_page import ROOT, Page, template
 from study.explore.session import Session, Stage, begin_with, with_diagnosis, with_stage, worst
 from study.explore.view import View
 from study.faults.accounting import Accounted
+from study.support.extras import undrawn
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
@@ -133,24 +132,35 @@ def files(
     return {
         name: model_file.revised(text, name, model).encode(),
         history.name_for(name): history.as_bytes(steps),
-        **history_pictures(steps, name.rpartition(".")[0] or name),
+        **_history_picture(steps, name.rpartition(".")[0] or name),
         PAGE: saved(session),
         **shown,
     }
 
 
 def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:
-    """Pictures and tables of one model, on each of its records and, if ``by_level``, by level."""
+    """Tables of one model, and pictures if they can be drawn, on each of its records and, if ``by_level``, by level."""
     each = now.on_each or (now.comparison,)
     levels = now.by_record.levels if now.by_record is not None and by_level else ()
     contents = {
         "comparison.json": as_json(comparison_document(each, levels)),
         **{f"{table}.csv": content for table, content in tables(each, levels).items()},
     }
+    if now.diagnosis is not None:
+        contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
+    if undrawn():
+        return contents
+    from study.compare.comparison_pictures import comparison_pictures, level_pictures
+
     for comparison in each:
         prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
         contents |= {prefix + name: content for name, content in comparison_pictures(comparison).items()}
-    contents |= level_pictures(levels, now.comparison.record.force_and_length[0])
-    if now.diagnosis is not None:
-        contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
-    return contents
+    return contents | level_pictures(levels, now.comparison.record.force_and_length[0])
+
+
+def _history_picture(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
+    if undrawn():
+        return {}
+    from study.compare.history_picture import history_files
+
+    return history_files(steps, name)

@@ -46,7 +46,7 @@ PUT_OFF = (
     "a coefficient seems to change along the record, which looks like many a fault of the measurement: diagnose looks "
     "for those beside the change"
 )
-NOT_ASKED = "faults of the measurement were not looked for: that takes one unbroken stretch of a driven record"
+NOT_ASKED = "faults of the measurement were not looked for: that takes a driven record in one piece, without --use"
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,16 @@ from matplotlib import style as styles
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.patches import Patch
+from matplotlib.textpath import TextToPath
 
 from study.support.errors import StudyError
 from study.support.files import replace_file
 
 LEFT, BOTTOM, TITLE, GAP = 0.88, 0.55, 0.58, 0.34  # inches
 WIDTH = 6.4
+TEXT_TO_PATH = TextToPath()
 METADATA = {
     "svg": {"Date": None},
     "png": {"Software": None},
@@ -60,10 +63,18 @@ def empty_page(
 
 
 def head(figure: Figure, title: str, subtitle: str, left: float, top: float) -> None:
-    """Title and subtitle, so many inches from the left and the title so many from the top."""
+    """Title and subtitle, so many inches from the left and the title so many from the top; smaller where too long."""
     width, height = figure.get_size_inches()
-    figure.text(left / width, 1.0 - top / height, title, ha="left", va="top", fontweight="bold", fontsize=11)
-    figure.text(left / width, 1.0 - 0.33 / height, subtitle, ha="left", va="top", fontsize=10)
+    for text, below, largest, weight in ((title, top, 11.0, "bold"), (subtitle, 0.33, 10.0, "normal")):
+        font = FontProperties(size=largest, weight=weight)
+        if text:
+            font.set_size(largest * min(1.0, (width - left - 0.16) / text_width(text, font)))
+        figure.text(left / width, 1.0 - below / height, text, ha="left", va="top", fontproperties=font)
+
+
+def text_width(text: str, font: FontProperties) -> float:
+    """Inches that a line of text takes; what stands between ``$`` is a formula."""
+    return TEXT_TO_PATH.get_text_width_height_descent(text, font, ismath="$" in text)[0] / 72.0
 
 
 def rows_for(entries: int) -> int:

@@ -25,11 +25,11 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/step_0/structure.png": "where a force is missing from the structure as given",
     "climb/step_0/candidates.png": "what could be missing from the model as given",
     "climb/step_0/constancy.png": "the test of a constant coefficient: a true effect has one",
-    "climb/decay.png": "frequency and damping ratio against amplitude, of the model reached",
-    "climb/loops.png": "loops of the force, of the model reached",
-    "climb/response.png": "the model reached beside the measurement",
-    "climb/missing_force.png": "the force that the model reached still lacks",
-    "climb/force_error.png": "unexplained force by frequency, of the model reached",
+    "climb/decay.png": "frequency and damping ratio against amplitude, final model",
+    "climb/loops.png": "loops of the force, final model",
+    "climb/response.png": "final model and measurement",
+    "climb/missing_force.png": "the force that the final model still lacks",
+    "climb/force_error.png": "unexplained force by frequency, final model",
 }
 KEPT = (
     "climb/decay.png",
@@ -199,21 +199,15 @@ def told(entry: Entry) -> list[Block]:
 def of_literature(entry: Entry) -> list[Block]:
     """What was done to the structure, and what is known of it."""
     known = entry.known
-    return [document.Text(f"{known.test}. {known.source}"), document.Text(f"**In the literature.** {known.known}")]
+    return [document.Text(f"{known.test}. {known.source}"), document.Text(f"Known: {known.known}")]
 
 
 def published_and_found(entry: Entry) -> list[Block]:
     """Published values beside those found, if there are any."""
     if not entry.values:
         return []
-    return [document.Text("**Published values beside those found.**"), beside_each_other(entry.values)]
-
-
-def in_short(found: RecordFindings, named: bool) -> Block:
-    """From where the climb of a record begins to what it leaves, in a paragraph."""
-    begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
-    name = f"**`{found.record}`.** " if named else ""
-    return document.Text(f"{name}The model is given as {begins}. **What is left at the end.** {left(found)}")
+    reasons = "; ".join(f"({letter}) {within}" for within, letter in _letters(entry.values).items())
+    return [beside_each_other(entry.values), document.Text(f"To be expected: {reasons}.")]
 
 
 def of_record(found: RecordFindings, named: bool) -> list[Block]:
@@ -282,15 +276,23 @@ def _changes(candidate: Fields) -> str:
 
 
 def beside_each_other(values: Sequence[Beside]) -> Block:
-    """Published values and those found."""
+    """Published values and those found; a letter names what ``published_and_found`` says may be expected."""
+    letters = _letters(values)
     rows = [
         (f"`{v.published.record}`, {v.published.quantity}", _number(v.published.value, v.published.unit),
          "not in the model" if v.found is None else _number(v.found, v.published.unit),
          "" if v.interval is None else f"{v.interval[0]:.4g} to {v.interval[1]:.4g}",
-         "" if v.found is None else f"{v.found / v.published.value - 1.0:+z.1%}".replace("%", " %"), v.published.within)
+         "" if v.found is None else f"{v.found / v.published.value - 1.0:+z.1%}".replace("%", " %"),
+         f"({letters[v.published.within]})")
         for v in values
     ]  # fmt: skip
-    return document.table(("", "published", "found", "95 % interval", "differs by", "to be expected"), rows)
+    return document.table(("", "published", "found", "95 % interval", "differs by", "expected"), rows)
+
+
+def _letters(values: Sequence[Beside]) -> dict[str, str]:
+    """What may be expected of published values, each with a letter."""
+    reasons = dict.fromkeys(v.published.within for v in values)
+    return {reason: chr(ord("a") + number) for number, reason in enumerate(reasons)}
 
 
 def _number(value: float, unit: str) -> str:
@@ -324,10 +326,11 @@ def climb_overview(shown: Sequence[Entry]) -> Block:
     rows = [
         (f"`{f.record}`", percent(f.steps[0]["error"]["response"]), _added(f),
          percent(f.steps[-1]["error"]["response"]), percent(f.steps[-1]["noise_floor"]["response"]),
+         percent(f.last["left"]) if f.last.get("left") and f.last["verdict"] not in (NOTHING, MISSING) else "",
          f.last["verdict"].replace("_", " "))
         for e in shown for f in e.found
     ]  # fmt: skip
-    head = ("record", "error as given", "added", "error at the end", "noise floor", "last verdict")
+    head = ("record", "error as given", "added", "error at the end", "noise floor", "depends on motion", "last verdict")
     return document.table(head, rows)
 
 
@@ -370,8 +373,7 @@ def documented(shown: Sequence[Entry], folder: str) -> list[Block]:
     parts: list[Block] = [climb_overview(shown)]
     for entry in shown:
         parts.append(Heading(entry.known.title))
-        parts += [*of_literature(entry), *(in_short(one, len(entry.found) > 1) for one in entry.found)]
-        parts += published_and_found(entry)
+        parts += [*of_literature(entry), *published_and_found(entry)]
         first = entry.found[0]
         parts += [Image(PICTURES[name], f"{folder}/{picture_name(first, name)}") for name in kept(first)]
     return parts

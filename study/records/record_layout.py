@@ -38,7 +38,7 @@ class Layout:
     fit: Span | None = None  # samples to fit ...
     judge: Span | None = None  # ... and to judge
     alternate: bool = False  # whether every other block is judged
-    response: str | None = None  # the measured motion that free runs are held against
+    response: str | None = None  # the measured motion that free runs are compared with
     cutoff: float | None = None  # hertz above which a measured acceleration is integrated
     near: float | None = None  # hertz near which the mode lies that is meant, where the record shows several
     highest: float | None = None  # hertz above which nothing is used
@@ -321,7 +321,8 @@ def strung_together(
         if off > 1e-6:
             notes = [
                 *notes,
-                f"{rates}, {1e6 * off:.2g} ppm apart as two clocks are: both count as {1.0 / first.dt:.8g}",
+                f"{rates}, {1e6 * off:.2g} ppm apart as two clocks are: both are taken as {1.0 / first.dt:.8g} Hz "
+                "(--fs says otherwise)",
             ]
         for channel in (*first.forces, *map(str, first.sensors)):
             one, two = first.units.get(channel, ""), other.units.get(channel, "")

@@ -207,7 +207,10 @@ def low_passed(record: Record, highest: float) -> tuple[Record, str]:
     expect(
         factor > 1, f"{record.name}: what lies above {highest:g} Hz is to be left out; expected {most:.3g} Hz or less"
     )
-    said = f"what lies above {highest:g} Hz is left out of force and motion, which begins to fade at that frequency"
+    said = (
+        f"force and motion fade out from {highest:g} Hz to {2.0 * highest:g} Hz; a mode in between still shows, so "
+        "choose at most half the frequency of the first mode to be left out"
+    )
     return decimated(record, factor), said
 
 

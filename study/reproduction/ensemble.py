@@ -167,18 +167,6 @@ def middle(sizes: Floats, count: int) -> tuple[float, float]:
     return median, 0.5 * float(ranked[above] - ranked[below]) if math.isfinite(median) else math.inf
 
 
-def worst_bias(table: pd.DataFrame) -> pd.DataFrame:
-    """By case and estimator the parameter with the largest ``ratio`` of bias to scatter.
-
-    ``ratio_error`` is the ratio that chance alone brings.
-    """
-    scattered = table[table["scatter"] > 0.0]
-    ratio = scattered["bias"].abs() / scattered["scatter"]
-    ratios = scattered.assign(ratio=ratio, ratio_error=1.0 / np.sqrt(scattered["found"]))
-    highest = ratios.groupby(["case", "estimator"], sort=False)["ratio"].idxmax()
-    return ratios.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
-
-
 def estimator_names(table: pd.DataFrame) -> Sequence[str]:
     """Names of the estimators in the order of the table."""
     return list(dict.fromkeys(str(name) for name in table["estimator"]))

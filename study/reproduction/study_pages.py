@@ -269,7 +269,7 @@ def error_sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[s
             gains = errors.loc[keep & (errors["estimator"] == name), "gain"].dropna()
             if len(gains):
                 nearer = f"nearer than MI/SO in {int((gains > 1.0).sum())} of {len(gains)} parameters"
-                words.append(f"{where} {nearer}, its median gain {factor(gains.median())}")
+                words.append(f"{where} {nearer}, with a median gain of {factor(gains.median())}")
         lines.append(f"**{look(name).label}**: {'; '.join(words)}.")
     return tuple(lines)
 
@@ -278,27 +278,19 @@ def about_errors(errors: pd.DataFrame) -> str:
     """What the numbers of :func:`error_overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
-    return (
-        f"Median over {seeds} seeds of the error, in %, then the middle one of a case's parameters; in brackets the "
-        f"gain, the error of MI/SO over this one, likewise the middle one. Of these runs {trouble}."
-    )
+    return f"Median error in % over {seeds} seeds, then over the parameters of a case. Of these runs {trouble}."
 
 
 def error_overview(errors: pd.DataFrame) -> Block:
-    """One row a case, one column an estimator: the median of its parameters' errors, and of their gains."""
+    """One row a case, one column an estimator: the median of its parameters' errors."""
     relative = errors[errors["kind"] == "relative"].groupby(["case", "estimator"], sort=False)
-    middles = relative[["median_error", "gain"]].median().reset_index().assign(kind="relative")
-    return by_estimator(middles, ("case",), ensemble.estimator_names(errors), _error_and_gain)
+    middles = relative[["median_error"]].median().reset_index()
 
+    def error(row: Row) -> str:
+        size = 100.0 * row["median_error"]
+        return two_digits(size) if math.isfinite(size) else "none"
 
-def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
-    """One row a case with noise, one column an estimator: the largest bias over scatter, and whose it is."""
-    worst = ensemble.worst_bias(errors[errors["case"].map(noise) > 0.0])
-
-    def ratio(row: Row) -> str:
-        return f"{two_digits(row['ratio'])} ({row['parameter']})"
-
-    return by_estimator(worst, ("case",), ensemble.estimator_names(errors), ratio)
+    return by_estimator(middles, ("case",), ensemble.estimator_names(errors), error)
 
 
 def _error_and_gain(row: Row) -> str:

@@ -1,4 +1,4 @@
-"""The constants that decide what is said of a model; docs/tool.md tells what each controls, and trials that it does."""
+"""The constants that decide what is said of a model, each with what it controls; docs/tool.md has trials of two."""
 
 ALPHA = 0.01  # probability of believing in what is not there, all that was asked for together
 K = 3.0  # standard errors of their difference within which two candidates are a tie

@@ -106,7 +106,7 @@ def test_a_folder_is_one_page_and_goes_on_where_a_run_was_killed(measured, monke
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["rig.yaml"], "rig.yaml: this is no folder; expected one with records, or 'study compare' for a file"),
+        (["rig.yaml"], "rig.yaml: this is not a folder; expected one with records, or 'study compare' for a file"),
         (["empty"], "empty: there is no record in it; expected files such as rig.csv"),
         (["twice"], "two records are called a; expected a name for each"),
         (["twice/..", "--by", "date"], "there is no record in it"),

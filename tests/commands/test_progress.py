@@ -28,3 +28,18 @@ def test_progress_without_a_total_counts(monkeypatch: pytest.MonkeyPatch, capsys
     with command.progress(" candidates") as step:
         step("")
     assert "candidates" in capsys.readouterr().err
+
+
+def test_a_second_round_of_a_diagnosis_has_a_total_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Sets are counted after candidates, and a corrected record is diagnosed anew: what is still to come is known."""
+    monkeypatch.setattr(command, "QUIET", 0.0)
+    monkeypatch.setattr(tqdm, "tqdm", partial(tqdm.tqdm, mininterval=0.0))
+    with command.progress(" fits") as step:
+        for of in (5, 3):
+            for done in range(1, of + 1):
+                step("", of - done)
+    shown = [(int(done), int(total)) for done, total in re.findall(r"(\d+)/(\d+) \[", capsys.readouterr().err)]
+    assert [total for done, total in shown if done in (1, 6)] == [5, 8]
+    assert shown[-1] == (8, 8)

@@ -124,7 +124,7 @@ def test_with_noise_the_quantity_and_the_parity_stay_right(hidden: str, seed: in
 
 @pytest.mark.parametrize("hidden", ["relaxation", "periodic_stiffness", "harmonic_force"])
 def test_what_is_no_function_of_the_motion_is_not_called_one(hidden: str) -> None:
-    assert "no power of displacement or velocity accounts for it" in comparison_in_words(trial(hidden, 4, 0.01))
+    assert "no power of displacement or velocity explains it" in comparison_in_words(trial(hidden, 4, 0.01))
 
 
 def test_the_true_model_is_as_good_as_the_noise_after_the_effect_is_added() -> None:

@@ -236,7 +236,7 @@ def test_the_bouc_wen_record_is_no_function_of_the_motion_and_hysteresis_reaches
         "displacement=y", "--fs", "750", "--period", "8192", "--model", "rig.yaml", "--out", "bw",
     ]  # fmt: skip
     assert cli.main(words) == 0
-    assert "no power of displacement or velocity accounts for it" in capsys.readouterr().out
+    assert "no power of displacement or velocity explains it" in capsys.readouterr().out
     assert json.loads(Path("bw/comparison.json").read_text())["noise_floor"]["from"] == "scatter between periods"
     held = "{term: hysteresis, beta: 800.0, gamma: -1100.0}"  # the published system
     Path("rig.yaml").write_text(LINEAR.replace("linear_stiffness]", f"linear_stiffness, {held}]"))

@@ -89,6 +89,13 @@ def test_nothing_missing_is_said_where_nothing_is():
     assert "Nothing is missing" in diagnosis_sentences(diagnosis)[0]
 
 
+def test_a_model_that_misses_much_is_not_called_complete_where_nothing_is_found(of_drag):
+    said = diagnosis_sentences(replace(of_drag, verdict=NOTHING))[0]
+    assert of_drag.comparison.prediction.above_noise > 0.1
+    assert "does not describe this record" in said
+    assert "Nothing is missing" not in said
+
+
 @pytest.mark.long
 def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
     trial = trials.make_trial(903, hidden=["periodic_stiffness"], noise=0.0)

@@ -104,7 +104,7 @@ def test_the_test_that_is_proposed_decides_and_the_same_again_does_not(plan):
     assert plan.again.promise < 0.8
     said = next_test_in_words(plan)
     assert "decides between" in said
-    assert "as was" in said
+    assert "a repetition of this record's test" in said
 
 
 def test_a_rehearsal_is_a_record_of_the_test_with_the_noise_of_this_one(rivals, plan):

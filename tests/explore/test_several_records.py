@@ -206,6 +206,9 @@ def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path, page):
         ends = page.evaluate("(r => [r.start, r.end])(Bokeh.documents[0].get_model_by_name('range_time'))")
         assert ends == pytest.approx(grown.now.on_each[number].prediction.time[[0, -1]], rel=1e-5)
     assert not wrong
+    assert len(re.findall(rb"/Type /Page\b", page.pdf(format="A4", prefer_css_page_size=True))) == 1
+    page.emulate_media(media="print")
+    assert all(page.is_visible(f"[data-act=record][data-name='{number}']") for number in (0, 1)), "names are there"
 
 
 def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):

@@ -95,4 +95,4 @@ def test_two_clocks_are_never_quite_the_same(tmp_path: Path, ppm: float, refused
             laid_out(records, Layout())
     else:
         notes = laid_out(records, Layout()).notes
-        assert any("25 ppm apart as two clocks are: both count as 200" in note for note in notes)
+        assert any("25 ppm apart as two clocks are: both are taken as 200 Hz (--fs" in note for note in notes)

@@ -98,13 +98,6 @@ def test_notes_are_counted():
     assert "1 searches did not converge" in study_pages.about_errors(found)
 
 
-def test_largest_bias_is_named_by_its_parameter():
-    both = pd.concat([estimates("a", "miso", "k", 1.0, [1.1, 0.9, 1.01]), estimates("a", "miso", "c", 1.0, [1.3, 1.4])])
-    found = ensemble.worst_bias(ensemble.estimator_errors(both)).iloc[0]
-    assert found["parameter"] == "c"
-    assert found["ratio"] == pytest.approx(0.35 / np.std([1.3, 1.4], ddof=1))
-
-
 def test_a_kept_table_over_more_seeds_is_of_the_same_study(table):
     kept = table.assign(seeds=200, median_error=0.5 * table["median_error"])
     assert ensemble.differing_cases(table, kept.sample(frac=1.0, random_state=1)) == []
@@ -217,8 +210,7 @@ def test_the_page_for_users_holds_the_numbers_of_its_table(tmp_path):
     spec.loader.exec_module(script)
     for name in ("estimators.md", "estimators.csv", "estimators.png"):
         (tmp_path / name).write_bytes((ROOT / "docs" / name).read_bytes())
-    noise = CONFIG.noise
-    script.main(tmp_path / "estimators.md", ROOT / "docs" / "estimators.csv", ROOT / "docs" / "estimators.png", noise)
+    script.main(tmp_path / "estimators.md", ROOT / "docs" / "estimators.csv", ROOT / "docs" / "estimators.png")
     assert (tmp_path / "estimators.md").read_text() == (ROOT / "docs" / "estimators.md").read_text()
     with pytest.raises(StudyError, match="there is no such file"):
-        script.main(tmp_path / "estimators.md", tmp_path / "none.csv", tmp_path / "estimators.png", noise)
+        script.main(tmp_path / "estimators.md", tmp_path / "none.csv", tmp_path / "estimators.png")

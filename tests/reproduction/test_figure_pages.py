@@ -136,3 +136,10 @@ def test_preliminary_figures(products, tmp_path, system, kind, monkeypatch):
 def test_the_stretch_of_force_is_as_long_as_a_segment(products, length):
     figure = force_history(products("plain", segments=Segments(length)))
     assert len(figure.axes[0].lines[0].get_xdata()) == length
+
+
+def test_a_subtitle_that_is_too_long_for_its_page_is_written_smaller():
+    figure, _ = page.empty_page("A title", "three records of one rig; " * 4)
+    title, subtitle = figure.texts
+    assert title.get_fontsize() == 11.0
+    assert page.LEFT + page.text_width(subtitle.get_text(), subtitle.get_fontproperties()) < page.WIDTH

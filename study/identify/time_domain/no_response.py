@@ -55,8 +55,8 @@ def unfit(model: Model, prepared: Prepared) -> str:
     mass, error = float(values[0]), float(errors[0])
     if mass < -SURE * error and float(values[1]) < SURE * float(errors[1]):
         return (
-            f"the {response} of {name!r} seems to have the other sign: its best linear system has the mass {mass:.3g}; "
-            f"expected force and {response} positive in the same direction"
+            f"force and {response} of {name!r} seem to have opposite signs (a linear fit gives a mass of {mass:.3g}); "
+            "expected both positive in the same direction: --scale force=-1 turns the force round"
         )
     if mass < SURE * error:
         return (

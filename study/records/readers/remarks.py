@@ -40,7 +40,7 @@ def on_samples(record: Record) -> tuple[str, ...]:
         said.append(f"the first {(still - begin) * record.dt:.3g} s are at rest")
         begin = still
     at = record.start + begin * record.dt
-    left_out = f"{' and '.join(said)}: that tells nothing of the motion ({LEAVING_OUT}{at:.6g}: begins behind it)"
+    left_out = f"{' and '.join(said)}: that says nothing about the motion ({LEAVING_OUT}{at:.6g}: starts after it)"
     return tuple(filter(None, (sign, left_out if said else None)))
 
 
