@@ -28,7 +28,7 @@ from scripts.page_picture import QUIET, browser
 from study import trials
 from study.equations import model_file
 from study.explore import html_page, session
-from study.explore.saved_files import files, of_stage
+from study.explore.saved import files, of_stage
 from study.explore.server import AGAIN
 from study.explore.view import View
 from study.records.prepared import prepare_record

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from study.commands.parser import parser
 from study.support.errors import StudyError, expect
+from study.support.extras import lacked
 from study.support.terminal import harmless, shown_on
 
 LONG = re.compile(r"\S{400,}")  # a word that no path and no value needs: a message is to be read
@@ -46,8 +47,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _end(BAD_INPUT, _file_trouble(error))
     except MemoryError:
         return _end(BAD_INPUT, "there is not enough memory for this; ask for fewer samples")
+    except ModuleNotFoundError as error:
+        return _end(BAD_INPUT, sentence) if (sentence := lacked(error)) else _fault(error)
     except Exception as error:  # a user is never shown a traceback
-        return _end(FAULT, f"a fault in the program, not in your input ({_place(error)}); please report it")
+        return _fault(error)
 
 
 def _run(argv: Sequence[str] | None) -> None:
@@ -61,6 +64,10 @@ def _run(argv: Sequence[str] | None) -> None:
     except SystemExit:  # --help and --version have printed what was asked
         return
     arguments.run(arguments)
+
+
+def _fault(error: Exception) -> int:
+    return _end(FAULT, f"a fault in the program, not in your input ({_place(error)}); please report it")
 
 
 def _file_trouble(error: OSError) -> str:

@@ -40,8 +40,10 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.support.document import document_page
     from study.support.errors import StudyError, expect
+    from study.support.extras import needed
     from study.support.files import check_folder, write_files
 
+    needed("matplotlib", "'study campaign'", "pictures")
     records, folder = _records_in(arguments.folder), arguments.out
     out: Path = folder if folder is not None else RESULTS / (arguments.folder.resolve().name or "campaign")
     check_folder(out)

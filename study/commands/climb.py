@@ -14,7 +14,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
-from study.explore.saved_files import PAGE, files
+from study.explore.saved import PAGE, files
 from study.explore.session import Session
 from study.support.files import read_text, write_files
 

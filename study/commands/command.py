@@ -9,8 +9,6 @@ from typing import Protocol
 
 from study.support.terminal import harmless
 
-QUIET = 2.0  # seconds of work before progress is shown
-
 
 @dataclass(frozen=True)
 class Command:
@@ -38,7 +36,8 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
     """
     from tqdm import tqdm
 
-    with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=harmless(name) or None) as bar:
+    # progress is shown after two seconds of work
+    with tqdm(total=total, delay=2.0, leave=False, unit=unit, desc=harmless(name) or None) as bar:
 
         def step(doing: str, to_come: int | None = None) -> None:
             if doing:
@@ -50,6 +49,12 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
             bar.update()
 
         yield step
+
+
+def say_left_out(*why: str) -> None:
+    """Say in one line what was left out, and why: sentences of ``extras.lacking``, empty where nothing lacks."""
+    if any(why):
+        print(f"Left out: {'; '.join(sentence for sentence in why if sentence)}.")
 
 
 def finite_number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:

@@ -17,7 +17,10 @@ from study.commands.record_arguments import (
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from study.compare.comparison import Comparison
+    from study.compare.fitted_coefficients import Level
 
 PAGE = "explore.html"
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
@@ -36,12 +39,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import each_record
     from study.compare.comparison import STEPS, across_records
-    from study.compare.comparison_pictures import comparison_pictures, level_pictures
     from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
     from study.compare.each_record import levels_by_record
     from study.equations.model_file import read_model
     from study.faults.fault import fault_fields
-    from study.support.extras import lacking
+    from study.support.extras import lacking, undrawn
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -49,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments, model)
     model, marked, separate = separated_records(arguments, model, records)
     tests = [marked] if separate else [[record] for record in records]
-    many, unpaged = len(tests) > 1, lacking("bokeh", PAGE, "explore")
+    many, unpaged, unpictured = len(tests) > 1, lacking("bokeh", PAGE, "explore"), undrawn()
     files: dict[str, bytes] = {}
     with progress("step", (STEPS + 1) * len(tests)) as step:
         accounted = [
@@ -60,11 +62,11 @@ def _run(arguments: argparse.Namespace) -> None:
         for comparison in comparisons:
             step("pictures")
             prefix = f"{comparison.record.name}_" if many else ""
-            own = comparison_pictures(comparison) | _page(comparison, unpaged)
+            own = ({} if unpictured else _pictures(comparison)) | ({} if unpaged else _page(comparison))
             files |= {prefix + name: content for name, content in own.items()}
     measurement = [{"record": a.comparison.record.name, **fault_fields(f)} for a in accounted for f in a.faults]
     levels = across_records(comparisons)
-    files |= level_pictures(levels, comparisons[0].record.force_and_length[0])
+    files |= {} if unpictured else _level_pictures(levels, comparisons[0].record.force_and_length[0])
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
     content = comparison_document(comparisons, levels) | {"measurement": measurement}
     said = comparison_summary(comparisons, levels)
@@ -78,12 +80,23 @@ def _run(arguments: argparse.Namespace) -> None:
     pages = [name for name in files if name.endswith(".html")]
     page = "a page for each record" if many and pages else pages[0] if pages else f"no page ({unpaged})"
     count = {kind: sum(name.endswith(kind) for name in files) for kind in (".csv", ".png")}
-    print(f"\n{folder}: {page}, comparison.json, {count['.csv']} tables, {count['.png']} pictures (PNG and SVG)")
+    pictures = f"no pictures ({unpictured})" if unpictured else f"{count['.png']} pictures (PNG and SVG)"
+    print(f"\n{folder}: {page}, comparison.json, {count['.csv']} tables, {pictures}")
 
 
-def _page(comparison: "Comparison", unpaged: str) -> dict[str, bytes]:
-    if unpaged:
-        return {}
+def _pictures(comparison: "Comparison") -> dict[str, bytes]:
+    from study.compare.comparison_pictures import comparison_pictures
+
+    return comparison_pictures(comparison)
+
+
+def _level_pictures(levels: "Sequence[Level]", force_unit: str) -> dict[str, bytes]:
+    from study.compare.comparison_pictures import level_pictures
+
+    return level_pictures(levels, force_unit)
+
+
+def _page(comparison: "Comparison") -> dict[str, bytes]:
     from study.explore.saved import of_comparison
 
     return {PAGE: of_comparison(comparison)}

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command, progress
+from study.commands.command import Command, progress, say_left_out
 from study.commands.record_arguments import (
     accounted_together,
     add_each_record_argument,
@@ -45,6 +45,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.support.errors import expect
+    from study.support.extras import undrawn
     from study.support.files import write_files
 
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
@@ -58,6 +59,7 @@ def _run(arguments: argparse.Namespace) -> None:
         files |= {prefix + name: data for name, data in _diagnosed(model, [record], path, arguments, own).items()}
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
+    say_left_out(_no_page(), undrawn())
 
 
 def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Record]]":
@@ -66,13 +68,8 @@ def asked(arguments: argparse.Namespace) -> "tuple[Model, list[Term], list[Recor
     from study.equations import terms
     from study.equations.model_file import read_model
     from study.faults.fault import settings_beside
-    from study.support.errors import expect
 
     model = read_model(arguments.model)
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
-    )
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
@@ -137,7 +134,7 @@ def _diagnosed(
     levels = levels_by_record(comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
-    if model.named:
+    if model.named and not model.prescribed:
         print("\n" + modes_before_and_after(diagnosis))
     print("\n" + words)
     if faults:
@@ -148,11 +145,16 @@ def _diagnosed(
     return files | _page(found, unneeded)
 
 
-def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
-    """What is missing, of a structure place by place, as a page to look at; none without what draws it."""
+def _no_page() -> str:
+    """Why there can be no page, in a sentence; empty where there can."""
     from study.support.extras import lacking
 
-    if lacking("bokeh", PAGE, "explore"):
+    return lacking("bokeh", PAGE, "explore")
+
+
+def _page(found: "Diagnosed", unneeded: "tuple[Needless, ...]") -> dict[str, bytes]:
+    """What is missing, of a structure place by place, as a page to look at; none without what draws it."""
+    if _no_page():
         return {}
     from study.explore.saved import of_diagnosis
 

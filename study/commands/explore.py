@@ -53,14 +53,9 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     """The session with the model as given, on one record or fitted to several together and to each by itself."""
     from study.compare.comparison import STEPS
     from study.explore import session as sessions
-    from study.explore.by_record import Several, by_record, of_own
+    from study.explore.session import Several, by_record, of_own
     from study.faults.accounting import Accounted
-    from study.support.errors import expect
 
-    expect(
-        not (arguments.each_record and model.named),
-        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a session",
-    )
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate

@@ -22,8 +22,11 @@ def _run(arguments: argparse.Namespace) -> None:
         return
     print(history.history_table(steps))
     if arguments.out is not None:
-        from study.compare.history_picture import history_files
+        from study.support.extras import DRAWING, needed
         from study.support.files import check_folder, write_files
+
+        needed(*DRAWING)
+        from study.compare.history_picture import history_files
 
         check_folder(arguments.out)
         found = history_files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}

@@ -3,7 +3,7 @@
 import argparse
 import re
 
-from study.commands.command import Command, finite_number, progress
+from study.commands.command import Command, finite_number, progress, say_left_out
 from study.commands.record_arguments import (
     accounted_together,
     add_record_arguments,
@@ -57,6 +57,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.separation import limits_asked, rivals_of
     from study.equations import terms
     from study.equations.model_file import read_model
+    from study.support.extras import undrawn
     from study.support.files import write_files
 
     folder, model = out_folder(arguments), read_model(arguments.model)
@@ -82,6 +83,7 @@ def _run(arguments: argparse.Namespace) -> None:
             words, files = deciding_plan(next_test(rivals, limits, sensors=arguments.sensor, progress=step))
     write_files(folder, files, inputs_of(arguments))
     print(f"{words}\n\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
+    say_left_out("" if arguments.precision else undrawn())
 
 
 COMMAND = Command(

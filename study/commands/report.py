@@ -14,9 +14,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    from study.support.extras import needed
+    from study.support.files import write_files
+
+    needed("matplotlib", "'study report'", "pictures")
     from study.diagnose.one_page import one_page
     from study.diagnose.one_page_files import one_page_files
-    from study.support.files import write_files
 
     folder = out_folder(arguments)
     model, own, records = asked(arguments)

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from study.equations.simulate import Integrator
     from study.support.arrays import Floats
 
-MOST_SAMPLES = 10_000_000
 USUAL, MOST_STEPS = 8, 1000
-LOOK = 32_768  # samples at most, on which the steps are tried
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,10 +29,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         default=12.5,
         help="low-pass in Hz (default %(default)s)",
     )
-    parser.add_argument(
-        "--seed", type=whole_number(0, 2**63 - 1), default=1, help="the same seed gives the same record"
-    )
-    parser.add_argument("--samples", type=whole_number(16, MOST_SAMPLES), default=8192, help="default %(default)s")
+    parser.add_argument("--seed", type=whole_number(0, 2**63 - 1), default=1, help="the same seed gives the same record")
+    parser.add_argument("--samples", type=whole_number(16, 10_000_000), default=8192, help="default %(default)s")
     parser.add_argument(
         "--dt",
         type=finite_number(least=1e-15, most=1e15),
@@ -107,7 +103,8 @@ def _settled(
     from study.records.record import Sensor
     from study.support.thresholds import TOLERANCE
 
-    look = {name: samples[:LOOK] for name, samples in forces.items()}
+    # the steps are tried on no more samples
+    look = {name: samples[:32_768] for name, samples in forces.items()}
     sensors = [Sensor(c, "displacement") for c in model.coordinates]
 
     def motions(steps: int) -> "Floats":

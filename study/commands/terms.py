@@ -9,9 +9,6 @@ from study.commands.command import Command
 if TYPE_CHECKING:
     from study.equations.terms import Term
 
-WIDTH_WITHOUT_TERMINAL = 160
-NARROWEST = 24
-
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", help="a term to show in detail, or a word to search for (default: all)")
@@ -34,9 +31,9 @@ def terms_table(library: "tuple[Term, ...]", width: int | None = None) -> str:
 
     rows = [[t.name, t.formula, ", ".join(p.name for p in t.parameters), t.meaning, t.cause] for t in library]
     head = ["term", "formula", "shape parameters", "meaning", "common cause"]
-    width = width or shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns
+    width = width or shutil.get_terminal_size((160, 24)).columns
     fixed = sum(max(len(head[column]) + 2, *(len(row[column]) for row in rows)) + 2 for column in range(3))
-    prose = max(NARROWEST, (width - fixed - 2) // 2)
+    prose = max(24, (width - fixed - 2) // 2)
     text = tabulate(rows, head, tablefmt="simple", maxcolwidths=[None, None, None, prose, prose])
     return (
         f"{text}\n\nu displacement, v velocity, t time. 'study terms NAME' shows one with its coefficients and units."

@@ -11,7 +11,6 @@ from study.compare.prediction import SensorPrediction
 Floats = NDArray[np.float64]
 STRETCHES = 6
 BLOCKS = 48  # at most
-TOGETHER = 0.75  # of the level's variance between blocks: above, level and time change together
 APART = 6.0  # correlation times in a block, at least: then neighbours are nearly independent
 
 
@@ -63,7 +62,8 @@ def along_time(seen: SensorPrediction) -> AlongTime:
     together = 1.0 - _regress(np.concatenate([plain[:, :1], stretch], axis=1), level)[1] / max(
         float(level @ level), 1e-300
     )
-    return AlongTime(rows, p_value, growth, growth_error, together > TOGETHER)
+    # where the blocks hold more of the level's variance, level and time change together
+    return AlongTime(rows, p_value, growth, growth_error, together > 0.75)
 
 
 def _blocks(residual: Floats) -> int:

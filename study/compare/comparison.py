@@ -18,9 +18,10 @@ from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
 from study.compare.prediction import Prediction, SensorPrediction, predict
+from study.compare.unlike_records import unlike_in_words, unlike_records
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import LINEAR, Modes, is_positive, modes_of
+from study.equations.linear_part import LINEAR, Modes, modes_of
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
@@ -110,9 +111,7 @@ class Comparison:
 
     @cached_property
     def modes(self) -> Modes:
-        """Those of the linear part; none of a model without a mass."""
-        if not is_positive(self.fit.model, {}):
-            return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(self.model.coordinates))),) * 2)
+        """Those of the linear part; none of a component."""
         return modes_of(self.fit.model, self.found.symbols, self.found.covariance)
 
     @cached_property
@@ -197,7 +196,8 @@ def compare(
     judged = _judged(
         fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
     )
-    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit)]
+    unlike = unlike_in_words(unlike_records(fit, prepared), fit.model, prepared.record)
+    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit), unlike]
     return Comparison(
         model=model, prepared=prepared, fit=fit, found=found, notes=(*prepared.notes, *filter(None, said)),
         estimator=estimator, **judged,
@@ -216,7 +216,7 @@ def _of_a_structure(fit: FreeRunFit) -> list[str]:
     """What to say of several coordinates: motions that nothing ties down, values that the record does not show."""
     if not fit.model.named:
         return []
-    loose = 0 if fit.model.modal else loose_motions(fit.model)
+    loose = loose_motions(fit.model) if not (fit.model.prescribed or fit.model.modal) else 0
     drifts = f"nothing ties the structure down in {loose} of its motions: it may drift away as a whole"
     unclear = f"this record does not show, or cannot tell apart, {', '.join(fit.undecided)}"
     return [drifts if loose else "", unclear if fit.undecided else ""]

@@ -14,9 +14,8 @@ from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
 from study.compare.fitted_coefficients import Level
 from study.compare.force_map import curve, surface
-from study.compare.loops import loops
 from study.compare.place_pictures import place_figures, responses_figure
-from study.compare.varying_coefficients import varying_figure
+from study.compare.varying_pictures import varying_figure
 from study.equations.place import place_in_words
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
@@ -35,7 +34,7 @@ def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
             "response": (responses_figure if comparison.model.named else response_figure)(comparison),
             **({"force_error": force_error_figure(comparison)} if comparison.forces else {}),
             "missing_force": missing_force_figure(comparison), "error_in_time": error_in_time_figure(comparison),
-            **(place_figures if comparison.model.named else _of_its_kind)(comparison),
+            **(place_figures(comparison) if comparison.model.named else {}), **_of_its_kind(comparison),
             **({"varying": varying_figure(comparison.varying, comparison.record.name)} if comparison.varying else {}),
         }  # fmt: skip
         return page.image_files(drawn)
@@ -45,10 +44,9 @@ def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
     """What those who run a test of this kind expect to see of it."""
     from study.compare import kind_pictures
 
-    prepared, prediction = comparison.prepared, comparison.prediction
-    if prepared.response == FORCE:
-        return {"loops": kind_pictures.loops_figure(comparison, loops(prediction))}
-    found = decays_of(comparison)
+    if comparison.prepared.response == FORCE:
+        return {"loops": kind_pictures.loops_figure(comparison)}
+    found = None if comparison.model.named else decays_of(comparison)  # a structure decays in several frequencies
     return {} if found is None else {"decay": kind_pictures.decay_figure(comparison, found)}
 
 

@@ -1,13 +1,11 @@
 """A comparison as a document (JSON), tables (CSV), and the lines that a person reads first."""
 
-import io
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
-import pandas as pd
 from tabulate import tabulate
 
 from study.compare.by_estimator import FREE_RUN
@@ -22,6 +20,7 @@ from study.equations import model_file
 from study.equations.linear_part import Modes, modes_table
 from study.equations.place import HERE
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum
+from study.support.csv_text import Columns, columns_of, csv_bytes, filled, one_below_the_other
 from study.support.numbers import percent
 
 Row = dict[str, Any]
@@ -251,33 +250,35 @@ def _finite(value: object) -> object:
 
 def tables(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> dict[str, bytes]:
     """Every table by file name; the first column names the record."""
-    builders: dict[str, Callable[[Comparison], pd.DataFrame]] = {
+    builders: dict[str, Callable[[Comparison], Columns]] = {
         "comparison": _summary, "coefficients": _coefficients,
         **({"force_error": _force_error} if comparisons[0].forces else {}),
         "response_spectrum": _response_spectrum, "missing_force_curves": _curves, "missing_force_map": _map,
-        "growth": lambda c: pd.DataFrame(where(c)["amplitude"]),
-        "error_in_time": lambda c: pd.DataFrame(where(c)["time"]),
+        "growth": lambda c: columns_of(where(c)["amplitude"]),
+        "error_in_time": lambda c: columns_of(where(c)["time"]),
     }  # fmt: skip
     made = {name: _joined([(c.record.name, build(c)) for c in comparisons]) for name, build in builders.items()}
     if moving:
         names = [c.record.name for c in sorted(comparisons, key=lambda c: c.level)]
-        made["coefficients_by_level"] = _csv(pd.concat([_by_level(level, names) for level in moving]))
+        made["coefficients_by_level"] = _csv(one_below_the_other([_by_level(level, names) for level in moving]))
     return made
 
 
-def _joined(parts: Sequence[tuple[str, pd.DataFrame]]) -> bytes:
-    frames = [frame.assign(record=name) for name, frame in parts]
-    table = pd.concat([f for f in frames if len(f)] or frames)
-    return _csv(table[["record", *(c for c in table.columns if c != "record")]])
+def _joined(parts: Sequence[tuple[str, Columns]]) -> bytes:
+    """Tables of several records as one, the first column naming which; one without a row counts for nothing."""
+    return _csv(one_below_the_other([_named("record", name, table) for name, table in parts]))
 
 
-def _csv(table: pd.DataFrame) -> bytes:
-    text = io.StringIO()
-    table.to_csv(text, index=False, float_format="%.10g", lineterminator="\n")
-    return text.getvalue().encode()
+def _named(what: str, name: str, table: Columns) -> Columns:
+    """A table with a column before the others that says the same in each row."""
+    return {what: [name] * len(next(iter(table.values()), list[Any]())), **table}
 
 
-def _summary(comparison: Comparison) -> pd.DataFrame:
+def _csv(table: Columns) -> bytes:
+    return csv_bytes(table, "%.10g")
+
+
+def _summary(comparison: Comparison) -> Columns:
     prediction = comparison.prediction
     of_force = {
         "force_error_of_fitted_coefficients": comparison.force.parametric_total,
@@ -288,55 +289,54 @@ def _summary(comparison: Comparison) -> pd.DataFrame:
         "response_above_noise": prediction.above_noise, "force_error": comparison.force_error, **of_force,
         "rms_force": comparison.level, "time_p_value": comparison.time.p_value, "converged": comparison.fit.converged,
     }  # fmt: skip
-    return pd.DataFrame([row])
+    return columns_of([row])
 
 
-def _coefficients(comparison: Comparison) -> pd.DataFrame:
+def _coefficients(comparison: Comparison) -> Columns:
     rows: list[Row] = []
     for c in comparison.coefficients:
         low, high = c.interval or (math.nan, math.nan)
         row = {name: value for name, value in coefficient_row(c).items() if name not in ("interval", *c.place.plain())}
         rows.append(row | {"low": low, "high": high})
-    return pd.DataFrame(rows)
+    return columns_of(rows)
 
 
-def _force_error(comparison: Comparison) -> pd.DataFrame:
+def _force_error(comparison: Comparison) -> Columns:
     force = comparison.force
     columns: dict[str, Any] = {
         "frequency": force.frequency, "force_density": force.force, "unexplained": force.unexplained,
         "left_by_fitted": force.parametric, "noise": force.noise, "motion_above_noise": force.band,
     }  # fmt: skip
-    return pd.DataFrame(
-        columns | {f"cumulative {i.shape}": c for i, c in zip(force.inputs, force.cumulative, strict=True)}
-    )
+    return filled(columns | {f"cumulative {i.shape}": c for i, c in zip(force.inputs, force.cumulative, strict=True)})
 
 
-def _response_spectrum(comparison: Comparison) -> pd.DataFrame:
-    return _one_below_the_other("sensor", {
-        str(v.sensor): pd.DataFrame(
+def _response_spectrum(comparison: Comparison) -> Columns:
+    return _of_each("sensor", {
+        str(v.sensor): filled(
             {"frequency": v.noise.frequency, "difference": v.noise.residual, "noise": v.noise.density}
         ) for v in comparison.views
     })  # fmt: skip
 
 
-def _curves(comparison: Comparison) -> pd.DataFrame:
-    found: dict[str, pd.DataFrame] = {}
+def _curves(comparison: Comparison) -> Columns:
+    found: dict[str, Columns] = {}
     for place in comparison.missing.shown:
         lacking = comparison.missing.at(place)
         against = {"displacement": lacking.displacement, "velocity": lacking.velocity}
         lines = {name: curve(x[lacking.inner], lacking.force[lacking.inner]) for name, x in against.items()}
-        found[place.label] = pd.concat([pd.DataFrame({"against": name, **vars(line)}) for name, line in lines.items()])
-    return _one_below_the_other("place", found)
+        tables = [filled({"against": name, **vars(line)}) for name, line in lines.items()]
+        found[place.label] = one_below_the_other(tables)
+    return _of_each("place", found)
 
 
-def _one_below_the_other(what: str, frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def _of_each(what: str, tables: Mapping[str, Columns]) -> Columns:
     """Tables of several sensors or places, the first column naming which; one alone as it is."""
-    if len(frames) == 1:
-        return next(iter(frames.values()))
-    return pd.concat([frame.assign(**{what: name})[[what, *frame.columns]] for name, frame in frames.items()])
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    return one_below_the_other([_named(what, name, table) for name, table in tables.items()])
 
 
-def _map(comparison: Comparison) -> pd.DataFrame:
+def _map(comparison: Comparison) -> Columns:
     lacking = comparison.missing_force
     inner = lacking.inner
     plane = surface(lacking.displacement[inner], lacking.velocity[inner], lacking.force[inner])
@@ -344,15 +344,15 @@ def _map(comparison: Comparison) -> pd.DataFrame:
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (plane.displacement, plane.velocity))
     place = {"place": comparison.place.label} if comparison.model.named else {}
     columns = {"displacement": u[i], "velocity": v[j], "mean": plane.mean[i, j], "error": plane.error[i, j]}
-    return pd.DataFrame({**place, **columns})
+    return filled({**place, **columns})
 
 
-def _by_level(level: Level, names: Sequence[str]) -> pd.DataFrame:
-    return pd.DataFrame(
+def _by_level(level: Level, names: Sequence[str]) -> Columns:
+    return columns_of(
         {
-            "key": level.key, "record": names, "rms_force": level.force, "value": level.value, "error": level.error,
-            "unit": level.unit, "p_value": level.p_value, "moves": level.moves,
-        }
+            "key": level.key, "record": name, "rms_force": force, "value": value, "error": error, "unit": level.unit,
+            "p_value": level.p_value, "moves": level.moves,
+        } for name, force, value, error in zip(names, level.force, level.value, level.error, strict=True)
     )  # fmt: skip
 
 
@@ -362,7 +362,7 @@ def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level
     heads, rows = _sensor_rows(comparisons) if named else _record_rows(comparisons)
     errors = tabulate(rows, heads, tablefmt="simple", disable_numparse=True, stralign="right", colglobalalign="right")
     bodies = [_levels(moving, comparisons)] if moving else [_values(comparisons[0])]
-    if named and len(comparisons) == 1:
+    if named and len(comparisons) == 1 and not comparisons[0].model.prescribed:
         bodies.append(modes_table(comparisons[0].modes, comparisons[0].model.coordinates))
     text = "\n\n".join([_headline(comparisons[0]), errors, *bodies, says_of_all(comparisons, moving)])
     notes = list(dict.fromkeys(note for c in comparisons for note in c.notes))

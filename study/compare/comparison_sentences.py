@@ -11,18 +11,15 @@ from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.compare.varying_coefficients import varying_in_words
 from study.equations.place import place_in_words
+from study.records.record import FORCE
 from study.support.numbers import by_chance, percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
-NEAR = 0.25  # how near to a whole number a power must lie to be called by it
 SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
-HARDLY = 0.6  # a power below this is a step that noise has rounded, or close to one
-HIGHEST = 5.9  # the powers that are tried end at six
 HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
-WORSE = 1.1  # of the rms response: more than no motion at all would leave
 LEAST = ("inertia", "linear_damping", "linear_stiffness")
 NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
@@ -65,7 +62,8 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     if len(comparison.views) > 1:
         start += f", most at {comparison.worst.sensor} ({percent(comparison.worst.error)})"
     if comparison.prediction.error >= HOPELESS:
-        like = "as a model" if comparison.prediction.error < WORSE else "more than a model"
+        # more than that is more than no motion at all would leave
+        like = "as a model" if comparison.prediction.error < 1.1 else "more than a model"
         return (
             f"{start}, {like} that never moves would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
@@ -99,14 +97,16 @@ def _of_equations(comparison: Comparison) -> list[str]:
     """Which equation of a structure is violated most, and where a force would explain most of it."""
     missing, said = comparison.missing, list[str]()
     if missing.lacking:
-        said.append(f"the reverse system says no force of {', '.join(missing.lacking)}, which no sensor shows")
+        lacking, shown = ", ".join(missing.lacking), comparison.prepared.response != FORCE
+        why = "which no sensor shows" if shown else "where none was measured"
+        said.append(f"the reverse system says no force of {lacking}, {why}")
     if np.any(missing.rms > 0.0):
         i = int(np.argmax(missing.rms))
         name = missing.equations[i]
         left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms of its forces remain"
         said.append(f"the equation of {name} is violated most: {left}")
-    if len(comparison.views) > 1:
-        place, share = missing.aligned[0]
+    place, share = missing.aligned[0]
+    if len(comparison.views) > 1 and share > 0.0:
         said.append(
             f"a single force {place_in_words(place)} could make {percent(share)} of what stands above the noise"
         )
@@ -143,7 +143,7 @@ def _growth(way: Growth) -> str:
         return (
             f"is a force of constant size with the sign of {way.of}" if way.parity == "odd" else "is a constant force"
         )
-    if way.power < HARDLY:
+    if way.power < 0.6:  # a power below this is a step that noise has rounded, or close to one
         return f"hardly grows with {way.of} (about the power {way.power:.1f}) and is {PARITY[way.parity]}"
     if whole == 1:
         one_sided = "" if way.parity == "odd" else ", whatever its sign"
@@ -164,14 +164,15 @@ def _short(way: Growth) -> str:
 def _whole(way: Growth) -> int | None:
     """The whole number that a power is, if it is sure enough."""
     nearest = round(way.power)
-    near = abs(way.power - nearest) <= max(NEAR, TOLD_APART * way.power_error)
+    # a power is called by a whole number as near as this
+    near = abs(way.power - nearest) <= max(0.25, TOLD_APART * way.power_error)
     return nearest if near and way.power_error <= SURE and nearest in (0, 1, *NAMES) else None
 
 
 def _power(way: Growth, whole: int | None) -> str:
     if whole == 1:
         return "the size"
-    if way.power >= HIGHEST:
+    if way.power >= 5.9:  # the powers that are tried end at six
         return "a power of six or more"
     return f"the {NAMES[whole]}" if whole in NAMES else f"about the power {way.power:.1f}"
 

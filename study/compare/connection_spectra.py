@@ -15,8 +15,6 @@ from study.records import spectra
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-HIGHEST = 1.6  # times the highest natural frequency: where pictures of spectra end
-
 
 @dataclass(frozen=True, eq=False)
 class DynamicStiffness:
@@ -44,7 +42,8 @@ class DynamicStiffness:
 def highest_frequency(comparison: Comparison) -> float:
     """Where pictures of spectra end, in hertz: above the modes, below half of the sampling frequency."""
     half = 0.5 / comparison.prepared.dt
-    fastest = HIGHEST * float(np.max(comparison.modes.frequency))
+    # pictures of spectra end somewhat above the highest natural frequency
+    fastest = 1.6 * float(np.max(comparison.modes.frequency, initial=0.0))
     return min(half, fastest) if fastest > 0.0 else half
 
 

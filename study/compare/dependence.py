@@ -32,9 +32,6 @@ from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
 DEGREE = 7
-KNOTS = 24  # of a function of displacement or velocity in detail ...
-EDGES = (0.01, 0.99)  # ... between these quantiles: what lies beyond is too rare to tell a detail
-TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
 DEPENDENCE_SAMPLES = 16384  # samples of either part that are looked at
 
 
@@ -239,14 +236,15 @@ def _states(place: Place, left: Unexplained) -> list[Floats]:
     u, v = left.along(place)
     steps: Floats = np.diff(u, prepend=u[0])
     rate = float(np.std(steps) / np.std(v))  # time step in units of displacement over velocity
-    slow = [relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
+    slow = [relaxed(steps, float(np.exp(-rate / tau))) for tau in (0.1, 0.3, 1.0, 3.0, 10.0)]
     return slow + [hysteretic(steps, beta) for beta in (0.5, 1.5, 4.0)]
 
 
 def _hats(x: Floats) -> list[Floats]:
     """Piecewise linear functions that add up to any function of ``x`` without detail below a step, each shape (n,)."""
-    first, last = (float(edge) for edge in np.quantile(x, EDGES))
-    knots = np.linspace(first, last, KNOTS)
+    # what lies beyond these quantiles is too rare to tell a detail
+    first, last = (float(edge) for edge in np.quantile(x, (0.01, 0.99)))
+    knots = np.linspace(first, last, 24)  # of a function of displacement or velocity in detail
     inside = np.clip(x, first, last)
     return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 

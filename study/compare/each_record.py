@@ -17,13 +17,13 @@ from tabulate import tabulate
 
 from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import MOVES, RESOLUTION, Level
+from study.compare.unlike_records import CHANNEL
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import Component, Term
 from study.records.record import Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
-CHANNEL = "along_record_{}"  # one along this record and zero along the others
 SLOPES = {"u": "1", "u**3": "3*u**2", "u*abs(u)": "2*abs(u)"}  # d/du of the shapes that the library differentiates
 
 
@@ -58,11 +58,6 @@ def separated(
     expect(
         len(records) > 1,
         f"--each-record {names[0]}: there is one record; expected two or more, between which coefficients may differ",
-    )
-    expect(
-        not model.modal,
-        f"--each-record {names[0]}: the linear part of the model is a sum of modes, which are those of one record; "
-        "expected each record by itself, as 'study compare' and 'study diagnose --each' take several",
     )
     found = list(dict.fromkeys(item for name in names for item in _meant(model, name)))
     separate: list[Separate] = []

@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 from study.compare import panels
 from study.compare.comparison import Comparison
 from study.compare.decay import Decay, Decays
-from study.compare.loops import Loops
+from study.compare.loops import loops
 from study.equations import dimensions
 from study.figures import page
+from study.records.record import FORCE, MOTIONS, Sensor
 
 WIDE = 7.2  # inches
 
@@ -44,25 +45,34 @@ def _points(axis: panels.Axes, found: Decay, what: str) -> None:
     )  # fmt: skip
 
 
-def loops_figure(comparison: Comparison, found: Loops) -> Figure:
-    """Force over displacement and over velocity, measured and predicted, and the energy that each cycle takes."""
-    record, prediction = comparison.record, comparison.prediction.of(0)
-    part = record.part(*comparison.plan.judge)
-    units = {name: dimensions.pretty(record.units.get(name, "")) for name in ("force", "displacement", "velocity")}
+def loops_figure(comparison: Comparison) -> Figure:
+    """Force over displacement and over velocity, measured and predicted, and the energy that each cycle takes.
+
+    A row for each force that was measured.
+    """
+    record, sensors, titles = comparison.record, comparison.prediction.views, list[str]()
     figure, axes = page.empty_page(
         f"{record.name}: loops", f"model {comparison.model.name}; the judging part",
-        rows=1, columns=3, width=1.45 * WIDE, panel=2.9, share=False,
+        rows=len(sensors), columns=3, width=1.45 * WIDE, panel=2.9, share=False,
     )  # fmt: skip
-    for axis, against in zip(axes, ("displacement", "velocity"), strict=False):
-        axis.plot(part[against], prediction.measured, ".", markersize=1.6, color="0.62")
-        axis.plot(part[against], prediction.predicted, ".", markersize=1.2, color="C0")
-        axis.set_xlabel(f"{against} ({units[against]})")
-    axes[0].set_ylabel(f"force ({units['force']})")
-    axes[2].plot(found.stroke, found.measured, "o", markersize=3.5, color="0.45", label="measured")
-    axes[2].plot(found.stroke, found.predicted, "x", markersize=4.5, color="C0", label="model")
-    axes[2].locator_params(axis="x", nbins=4)  # strokes that differ by little have long labels
-    axes[2].set_xlabel(f"stroke of a cycle ({units['displacement']})")
-    axes[2].set_ylabel(f"energy ({units['force']} {units['displacement']})")
-    page.letter(axes, ("force over displacement", "over velocity", "dissipated in a cycle"))
+    for number, seen in enumerate(sensors):
+        own, found = axes[3 * number : 3 * number + 3], loops(comparison, number)
+        force, *units = (
+            dimensions.pretty(record.unit(Sensor(seen.sensor.coordinate, name))) for name in (FORCE, *MOTIONS[:2])
+        )
+        of = f" {found.across}" if found.across else ""
+        for axis, along, against, unit in zip(own, (found.displacement, found.velocity), MOTIONS, units, strict=False):
+            axis.plot(along, seen.measured, ".", markersize=1.6, color="0.62")
+            axis.plot(along, seen.predicted, ".", markersize=1.2, color="C0")
+            axis.locator_params(axis="x", nbins=6)
+            axis.set_xlabel(f"{against}{of} ({unit})")
+        own[0].set_ylabel(f"{seen.sensor} ({force})")
+        own[2].plot(found.stroke, found.measured, "o", markersize=3.5, color="0.45", label="measured")
+        own[2].plot(found.stroke, found.predicted, "x", markersize=4.5, color="C0", label="model")
+        own[2].locator_params(axis="x", nbins=4)  # strokes that differ by little have long labels
+        own[2].set_xlabel(f"stroke of a cycle ({units[0]})")
+        own[2].set_ylabel(f"energy ({force} {units[0]})")
+        titles += ["force over displacement", "over velocity", "dissipated in a cycle"]
+    page.letter(axes, titles)
     page.shared_legend(figure, axes)
     return figure

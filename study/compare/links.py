@@ -19,7 +19,6 @@ from study.support.statistics import IN_A_BLOCK
 
 Floats = NDArray[np.float64]
 BLOCKS = 64  # at most
-WINDOW = 256  # samples in the spectrum of a block, at most
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def power_in_blocks(seen: SensorPrediction) -> tuple[Floats, Floats]:
     Shapes (lines,) and (blocks, lines). The window of a spectrum may reach beyond its block.
     """
     values, bounds = seen.residual, _bounds(len(seen.residual))
-    length = min(WINDOW, 2 ** int(np.log2(len(values))))
+    length = min(256, 2 ** int(np.log2(len(values))))  # samples in the spectrum of a block, at most
     taper = Segments(length).taper()
     first = np.clip((bounds[1:] + bounds[:-1] - length) // 2, 0, len(values) - length)
     cut = np.lib.stride_tricks.sliding_window_view(values, length)[first] * taper

@@ -139,7 +139,8 @@ class Unbalanced:
     @property
     def shown(self) -> tuple[Place, ...]:
         """Places whose coordinates are all measured, that which could make most of what is left first."""
-        return tuple(p for p, _ in self.aligned if set(p.moving) <= set(self.coordinates))
+        known = self.model.coordinates if self.model.prescribed else self.coordinates
+        return tuple(p for p, _ in self.aligned if set(p.moving) <= set(known))
 
     @cached_property
     def curves(self) -> dict[str, ForceCurve]:
@@ -245,14 +246,20 @@ def unbalanced(model: Model, keys: Sequence[str], prediction: Prediction) -> Unb
 
 def _along_a_known_motion(model: Model, keys: Sequence[str], prediction: Prediction) -> Unbalanced:
     """The same where the motion is prescribed: what is left of the measured force, at all frequencies."""
-    seen, prepared, run = prediction.of(0), prediction.prepared, prediction.run
-    part = prepared.record.part(*prepared.plan.judge)
-    free = np.zeros((len(part), len(keys))) if run is None else run.derivatives(run.fit)[:, : len(keys)]
-    lines = np.ones((len(seen.noise.frequency), 1, 1))
+    prepared, run, noises = prediction.prepared, prediction.run, [view.noise for view in prediction.views]
+    part, sensors = prepared.record.part(*prepared.plan.judge), len(noises)
+    free = np.zeros((len(part), sensors, len(keys)))
+    if run is not None:
+        free = prepared.outputs.apart(run.derivatives(run.fit)[:, : len(keys)])
+    lines = np.broadcast_to(np.eye(sensors, dtype=np.complex128), (len(noises[0].frequency), sensors, sensors))
+    left = (prediction.misfit / np.where(prediction.size > 0.0, prediction.size, 1.0)).astype(np.complex128)
+    seen = {p: np.array(p.direction(prepared.coordinates), dtype=np.complex128) for p in connections(model)}
+    shares = [(p, alignment(e[None], left)) for p, e in seen.items() if np.any(e)]
     return Unbalanced(
-        model, prepared.record, model.coordinates, np.stack([part[m] for m in MOTIONS])[:, :, None],
-        seen.difference[:, None], free[:, None], np.zeros(1), lines[:, 0] > 0.0, lines.astype(np.complex128),
-        seen.noise.frequency, np.array([seen.noise.rms**2]), ((HERE, 1.0),), prediction.dt, 0,
+        model, prepared.record, prepared.coordinates, np.stack([part.motion(c) for c in model.coordinates], axis=2),
+        prediction.misfit, free, prediction.size, np.ones((len(lines), sensors), dtype=np.bool_), lines,
+        noises[0].frequency, np.array([noise.rms**2 for noise in noises]),
+        tuple(sorted(shares, key=lambda item: -item[1])), prediction.dt, 0,
     )  # fmt: skip
 
 

@@ -16,7 +16,6 @@ from study.records.record import Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 
 Floats = NDArray[np.float64]
-AVERAGES = 8  # segments without overlap, at least
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
@@ -43,7 +42,7 @@ class Noise:
 
 def segments_of(samples: int) -> Segments:
     """Segments for the spectra of a comparison."""
-    return Segments(segment_length(samples, held=AVERAGES, fewest=32, most=1024))
+    return Segments(segment_length(samples, held=8, fewest=32, most=1024))  # segments without overlap, at least
 
 
 def noise_of(

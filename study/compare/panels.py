@@ -21,8 +21,6 @@ from study.figures import labels
 
 Floats = NDArray[np.float64]
 COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
-CLOSE = 1000  # samples: fewer are drawn so that one curve does not hide the other
-SURE = 2.0  # standard errors: cells whose mean is below are marked as not sure
 MEASURED: dict[str, Any] = {"color": "0.62", "label": "measured"}
 PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}
 RESIDUAL: dict[str, Any] = {"color": "C1", "label": "measured less predicted"}
@@ -46,7 +44,7 @@ def time_history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any],
 def response_panel(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit: str) -> Axes:
     """Measured and predicted response."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(measured))))
-    close = len(time) <= CLOSE
+    close = len(time) <= 1000  # samples: fewer are drawn so that one curve does not hide the other
     time_history(axes, *with_breaks(time, measured / factor), MEASURED, linewidth=2.6 if close else 0.6)
     dashed = {"linestyle": (0, (3.0, 1.2)), "linewidth": 1.3} if close else {"alpha": 0.75, "linewidth": 0.6}
     time_history(axes, *with_breaks(time, predicted / factor), PREDICTED, **dashed)
@@ -117,7 +115,8 @@ def missing_force_panel(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axe
     )  # fmt: skip
     middle_u = 0.5 * (plane.displacement[1:] + plane.displacement[:-1]) / factor
     middle_v = 0.5 * (plane.velocity[1:] + plane.velocity[:-1]) / rate
-    i, j = np.nonzero(np.abs(plane.mean) < SURE * plane.error)
+    # cells whose mean is below two standard errors are marked as not sure
+    i, j = np.nonzero(np.abs(plane.mean) < 2.0 * plane.error)
     axes.plot(middle_u[i], middle_v[j], ".", color="0.45", markersize=1.5, label="may be noise")
     axes.grid(visible=False)
     place = axes.get_position()

@@ -32,7 +32,7 @@ def sensor_errors(axes: Axes, prediction: Prediction) -> Axes:
             percent(float(error)), (100.0 * float(error), y), xytext=(4, 0), textcoords="offset points", va="center",
             fontsize=8,
         )  # fmt: skip
-    axes.set_xlabel("error of the sensor (% of its rms motion)")
+    axes.set_xlabel("error of the sensor (% of its rms)")
     return axes
 
 

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from study.compare import panels, place_panels
 from study.compare.comparison import Comparison
-from study.compare.dependence import explained_by_place
+from study.compare.place_sketch import sketch_of
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
-from study.figures.sketch import Sketch, sketch
+from study.figures.sketch import Sketch
 from study.figures.sketch_drawing import structure_sketch
 from study.support.numbers import percent
 
@@ -27,17 +27,9 @@ def place_figures(comparison: Comparison) -> dict[str, Figure]:
     return {
         "structure": structure_figure(comparison, sketch_of(comparison)), "sensors": sensors_figure(comparison),
         **({"shared_force": shared_force_figure(comparison)} if comparison.missing.equations else {}),
-        "modes": modes(comparison, [("fitted", comparison.modes)]),
+        **({} if comparison.model.prescribed else {"modes": modes(comparison, [("fitted", comparison.modes)])}),
         **restoring_forces(comparison),
     }  # fmt: skip
-
-
-def sketch_of(comparison: Comparison) -> Sketch:
-    """The sketch of a structure.
-
-    A connection glows with the held-out share of what is left that general functions of its own motion explain.
-    """
-    return sketch(comparison.model, comparison.missing.coordinates, explained_by_place(comparison.leftovers))
 
 
 def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
@@ -58,7 +50,8 @@ def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
 def sensors_figure(comparison: Comparison) -> Figure:
     """Errors by sensor, and the force that is left of each equation of motion."""
     prediction, count = comparison.prediction, len(comparison.prediction.prepared.outputs.sensors)
-    columns = 2 if comparison.missing.equations else 1
+    prescribed = comparison.model.prescribed  # then what is left of an equation is what a sensor misses
+    columns = 2 if comparison.missing.equations and not prescribed else 1
     figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: error by sensor",
         f"model {comparison.model.name}; all sensors {percent(prediction.error)}, noise {percent(prediction.floor)}",
@@ -68,17 +61,21 @@ def sensors_figure(comparison: Comparison) -> Figure:
     place_panels.sensor_errors(axes[0], prediction)
     for panel in axes[1:]:
         place_panels.coordinate_forces(panel, comparison.missing)
-    page.letter(axes, ("motions", "equations of motion")[:columns])
+    page.letter(axes, ("forces" if prescribed else "motions", "equations of motion")[:columns])
     page.shared_legend(figure, axes, columns=4)
     return figure
 
 
 def responses_figure(comparison: Comparison) -> Figure:
-    """Measured and predicted motion of the sensors that are predicted worst, where the difference is largest."""
+    """Measured and predicted motion of the sensors that are predicted worst, where the difference is largest.
+
+    Or force, where the motion is prescribed.
+    """
     prediction = comparison.prediction
     order = np.argsort(-prediction.errors)[:SENSORS]
     figure, axes = page.empty_page(
-        f"{comparison.prepared.record.name}: motions", f"model {comparison.model.name}; close-up where it fails most",
+        f"{comparison.prepared.record.name}: {'forces' if comparison.model.prescribed else 'motions'}",
+        f"model {comparison.model.name}; close-up where it fails most",
         rows=len(order), width=WIDE, panel=1.5, share=False,
     )  # fmt: skip
     time = prediction.prepared.record.time[slice(*prediction.prepared.plan.judge)]

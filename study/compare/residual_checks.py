@@ -38,11 +38,12 @@ class ResidualChecks:
 
 def residual_checks(prediction: Prediction, sensor: int = 0) -> ResidualChecks:
     """The checks of the residual of one of the sensors on the judging part."""
-    prepared, residual = prediction.prepared, prediction.of(sensor).residual
+    prepared, seen = prediction.prepared, prediction.of(sensor)
+    residual = seen.residual
     residual = residual - np.mean(residual)
     n, force = len(residual), np.zeros(len(residual))
     if not prepared.free:
-        force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
+        force = prepared.record[drive_of(seen)][slice(*prepared.plan.judge)]
         force = force - np.mean(force)
     lags = min(LAGS, n // 4)
     own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)

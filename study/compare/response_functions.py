@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.compare.noise import segments_of
-from study.compare.prediction import Prediction
-from study.records.prepared import FORCE, Prepared
+from study.compare.prediction import Prediction, SensorPrediction
+from study.records.record import FORCE, MOTIONS, Sensor
 from study.records.spectra import SpectralMatrix, cross_spectra
 from study.support.arrays import Complexes, Floats
 from study.support.errors import expect
@@ -52,7 +52,7 @@ def response_functions(prediction: Prediction, sensor: int = 0) -> ResponseFunct
     prepared, seen = prediction.prepared, prediction.of(sensor)
     name = prepared.record.name
     expect(not prepared.free, f"{name}: no force acts; expected a driven record for a frequency response function")
-    drive = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
+    drive = prepared.record[drive_of(seen)][slice(*prepared.plan.judge)]
     cut = segments_of(len(drive))
     measured = cross_spectra([drive, seen.measured], prediction.dt, cut)
     predicted = cross_spectra([drive, seen.predicted], prediction.dt, cut)
@@ -65,9 +65,11 @@ def response_functions(prediction: Prediction, sensor: int = 0) -> ResponseFunct
     )
 
 
-def drive_of(prepared: Prepared) -> str:
-    """The channel that a response answers to: the force, the first of several, or a prescribed displacement."""
-    return "displacement" if prepared.response == FORCE else prepared.record.forces[0]
+def drive_of(seen: SensorPrediction) -> str:
+    """The channel that a response answers to: the force, the first of several, or the displacement prescribed there."""
+    if seen.sensor.motion == FORCE:
+        return str(Sensor(seen.sensor.coordinate, MOTIONS[0]))
+    return seen.prepared.record.forces[0]
 
 
 def _h1(matrix: SpectralMatrix) -> tuple[Complexes, Floats]:

@@ -5,7 +5,6 @@ long as the model with it follows: the error is that of the longer motion.
 """
 
 from study.compare.comparison import Comparison, compare
-from study.compare.running_on import running_on
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import search_base
 from study.equations.laid_variations import laid_entry
@@ -14,6 +13,7 @@ from study.equations.terms import Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import finished
+from study.way_in.compare_records import running_on
 
 
 def added(comparison: Comparison, term: Term | ModelTerm) -> Comparison:

@@ -16,14 +16,13 @@ from study.records.driven_by_motion import SAID
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS, OF_THE_GROUND, Record
+from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.states import starting_states
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
 AS_WAS, MULTISINE, SWEEP, BLOW = "as was", "multisine", "sweep", "blows"
 LET_GO, PRELOADED = "release", "static preload"
-QUIETEST = 0.01  # level of a test: less than a hundredth of what the record reached drowns
 Band = tuple[float, float]
 
 
@@ -83,7 +82,8 @@ class PresentTest:
     @property
     def prescribed(self) -> bool:
         """Whether its motion is what drives, and the force what is predicted."""
-        return self.drivers == (MOTIONS[0],)
+        strokes = {str(Sensor(c, MOTIONS[0])) for c in self.source.coordinates}
+        return bool(self.drivers) and strokes.issuperset(self.drivers)
 
     @property
     def kinds(self) -> tuple[tuple[str, str], ...]:
@@ -108,9 +108,9 @@ class PresentTest:
         if kind == PRELOADED:
             waves, begin = 0.5 + 0.5 * waves, 0.5 * level * self.deflection
         own = {d: level * peak * wave for d, peak, wave in zip(self.drivers, self.peaks, waves.T, strict=True)}
-        if self.prescribed:
-            u = own[MOTIONS[0]]
-            own |= {m: derivative(u, self.source.dt, order) for order, m in enumerate(MOTIONS[1:], start=1)}
+        for coordinate in self.source.coordinates if self.prescribed else ():
+            u, *rates = (str(Sensor(coordinate, motion)) for motion in MOTIONS)
+            own |= {name: derivative(own[u], self.source.dt, order) for order, name in enumerate(rates, start=1)}
         channels = {name: np.zeros(samples) for name in self.source.forces} | own
         if kind == AS_WAS:
             channels |= {name: self.source[name][:samples] for name in self.source.extra}
@@ -149,7 +149,8 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     record = prepared.record
     sources = list({id(s.source): s.source for s in record.stretches}.values()) or [record]
     source, prescribed = max(sources, key=len), prepared.response == FORCE
-    drivers = (MOTIONS[0],) if prescribed else () if prepared.free else tuple(f for f in record.forces if f in source)
+    forces = () if prepared.free else tuple(f for f in record.forces if f in source)
+    drivers = tuple(str(Sensor(c, MOTIONS[0])) for c in record.coordinates) if prescribed else forces
     centred = [s.columns(drivers) - prescribed * np.mean(s.columns(drivers), axis=0) for s in sources]
     peaks = np.max(np.abs(np.concatenate(centred)), axis=0, initial=0.0)
     seen = source.columns(prepared.outputs.sensors)
@@ -218,7 +219,8 @@ def possible_designs(
         levels = [share * loudest for share in shares if share > 0.3 or share * loudest >= 1.0]
         if kind == present.kinds[0][0] and reached(make(1.0)) <= 1.0 and _driven_within(make(1.0), present, limits):
             levels.append(1.0)
-        yield from (make(level) for level in levels if level >= QUIETEST)
+        # less than a hundredth of what the record reached drowns
+        yield from (make(level) for level in levels if level >= 0.01)
 
 
 def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:

@@ -6,7 +6,6 @@ from typing import Any
 from study.compare.comparison_report import as_json, mode_rows, where
 from study.compare.varying_coefficients import varying_fields
 from study.diagnose import diagnosis_report
-from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
@@ -17,6 +16,7 @@ from study.equations.linear_part import modes_table
 from study.faults import fault
 from study.faults.fault import Fault
 from study.records.record import Record
+from study.support.extras import undrawn
 from study.support.numbers import enumerated
 
 
@@ -50,7 +50,7 @@ def diagnosis_files(
     diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = (),
     unfitted: Mapping[str, str] | None = None, by_record: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, bytes]:  # fmt: skip
-    """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
+    """``diagnosis.json`` and the pictures, if they can be drawn, by file name; ``words`` is the diagnosis in words.
 
     ``unneeded`` are the terms of the model that it does not need, ``faults`` those of the measurement that the record
     was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted,
@@ -77,7 +77,12 @@ def diagnosis_files(
     content |= {"measurement": [fault.fault_fields(f) for f in faults]}
     if by_record:
         content["coefficients_by_record"] = list(by_record)
-    return {"diagnosis.json": as_json(content)} | picture_files(diagnosis, all_names(comparison.record))
+    found = {"diagnosis.json": as_json(content)}
+    if undrawn():
+        return found
+    from study.diagnose.diagnosis_pictures import picture_files
+
+    return found | picture_files(diagnosis, all_names(comparison.record))
 
 
 def modes_before_and_after(diagnosis: Diagnosis) -> str:

@@ -9,17 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from study.compare.place_pictures import modes, sketch_of, structure_figure
-from study.compare.varying_coefficients import varying_figure
+from study.compare.place_pictures import modes, structure_figure
+from study.compare.varying_pictures import varying_figure
+from study.diagnose.diagnosis_sketch import sketch_of_diagnosis
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.labels import term_names
-from study.figures.sketch import Sketch, sketch
 from study.figures.styles import in_style
 from study.support.numbers import percent
 
-SHOWN = 10
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
@@ -36,20 +35,9 @@ def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
             sets = [("as given", comparison.modes)]
             sets += [("with what is missing", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
             drawn["structure"] = structure_figure(comparison, sketch_of_diagnosis(diagnosis))
-            drawn["modes"] = modes(comparison, sets)
+            if not comparison.model.prescribed:
+                drawn["modes"] = modes(comparison, sets)
         return page.image_files(drawn)
-
-
-def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
-    """The sketch of a structure, glowing where an effect that is found, or tied with it, explains what is left."""
-    comparison = diagnosis.comparison
-    if diagnosis.answer is None:
-        return sketch_of(comparison)
-    shares: dict[frozenset[str], float] = {}
-    for row in diagnosis.sets:
-        for entry in row.entries:
-            shares.setdefault(entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
-    return sketch(comparison.model, comparison.missing.coordinates, shares)
 
 
 def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
@@ -72,7 +60,7 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
 
 def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     """Share of the held-out difference that each candidate explains, with its standard error."""
-    rows = diagnosis.candidates[:SHOWN]
+    rows = diagnosis.candidates[:10]
     place = np.arange(len(rows))
     shares = np.array([100.0 * r.gain.explained for r in rows])
     errors = np.array([100.0 * r.gain.error for r in rows])

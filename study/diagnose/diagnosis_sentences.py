@@ -65,7 +65,8 @@ def _nothing(diagnosis: Diagnosis) -> str:
 
 
 def _response(diagnosis: Diagnosis) -> str:
-    return "the motions" if len(diagnosis.comparison.prepared.outputs) > 1 else "the response"
+    several = "the forces" if diagnosis.comparison.model.prescribed else "the motions"
+    return several if len(diagnosis.comparison.prepared.outputs) > 1 else "the response"
 
 
 def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:

@@ -25,8 +25,6 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, K
 
-ROUNDS = 4  # steps of Gauss and Newton towards the delay
-
 
 def late_force(diagnosis: Diagnosis) -> Fault | None:
     """The delay of the force that explains as much of a component's record as the first candidate; None without any.
@@ -52,10 +50,10 @@ def late_force(diagnosis: Diagnosis) -> Fault | None:
 def _moved(fit: FreeRunFit, prepared: Prepared) -> tuple[float, float, FreeRunFit, Prepared]:
     """Samples by which the force comes late, the standard error, and the fit to the force without that delay."""
     earlier, late, error, now = _mover(prepared), 0.0, 0.0, prepared
-    for _ in range(ROUNDS):
+    for _ in range(4):  # steps of Gauss and Newton towards the delay
         jacobian = linearise(fit, now)
         force = now.fitted - fit.residual
-        columns = np.column_stack([jacobian, -_rate(force, now)])
+        columns = np.column_stack([jacobian, -now.outputs.stacked(_rates(now.outputs.apart(force), now))])
         steps = least_squares(columns, fit.residual)
         covariance = statistics.clustered_covariance(columns, fit.residual - columns @ steps)
         late, error = late + float(steps[-1]), float(np.sqrt(covariance[-1, -1]))
@@ -64,22 +62,24 @@ def _moved(fit: FreeRunFit, prepared: Prepared) -> tuple[float, float, FreeRunFi
     return late, error, fit, now
 
 
-def _rate(values: Floats, prepared: Prepared) -> Floats:
-    """Change of a channel of the fitting part with the sample, within each stretch, shape (n,)."""
+def _rates(values: Floats, prepared: Prepared) -> Floats:
+    """Change of channels of the fitting part with the sample, within each stretch, shape (n, channels)."""
     last = prepared.plan.fit[1]
     bounds = [b for b in prepared.record.joints if 0 < b < last]
-    return np.concatenate([np.gradient(piece) for piece in np.split(values, bounds)])
+    return np.concatenate([np.gradient(piece, axis=0) for piece in np.split(values, bounds)])
 
 
 def _mover(prepared: Prepared) -> Callable[[float], Prepared]:
-    """What gives the record with its force moved to earlier times by some samples, each source as a whole."""
+    """What gives the record with all of its forces moved to earlier times by some samples, each source as a whole."""
     stretches = prepared.record.stretches
     sources = {id(s.source): s.source for s in stretches}
 
     def moved(late: float) -> Prepared:
-        forces = {key: shifted(source[FORCE], -late) for key, source in sources.items()}
-        parts = [forces[id(s.source)][s.first : s.last] for s in stretches]
-        return replace(prepared, record=prepared.record.with_channels({FORCE: np.concatenate(parts)}))
+        moved_forces: dict[str, Floats] = {}
+        for name in prepared.record.forces:
+            whole = {key: shifted(source[name], -late) for key, source in sources.items()}
+            moved_forces[name] = np.concatenate([whole[id(s.source)][s.first : s.last] for s in stretches])
+        return replace(prepared, record=prepared.record.with_channels(moved_forces))
 
     return moved
 

@@ -20,6 +20,7 @@ from study.records.interpolation import between_samples
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Floats
+from study.support.extras import undrawn
 from study.support.numbers import enumerated, percent
 
 
@@ -187,14 +188,17 @@ def precise_test_fields(found: PreciseTest) -> dict[str, Any]:
 
 def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
     """A test that decides: what to print, and the content of its files."""
-    from study.diagnose.next_test_pictures import next_test_pictures  # which would make the page begin later
-
     said, rivals = next_test_in_words(found), found.rivals
     driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"))
     scale, files = _plan_files(
         next_test_fields(found) | promise_fields(found), said, found.limits, driven, rivals.prepared
     )
-    return f"{pair_table(found)}\n\n{said}{scale}", files | next_test_pictures(found)
+    told = f"{pair_table(found)}\n\n{said}{scale}"
+    if undrawn():
+        return told, files
+    from study.diagnose.next_test_pictures import next_test_pictures  # which would make the page begin later
+
+    return told, files | next_test_pictures(found)
 
 
 def precise_plan(found: PreciseTest) -> tuple[str, dict[str, bytes]]:

@@ -25,7 +25,7 @@ from study.identify.time_domain.part_fit import covariance_of, linearise
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.outputs import Noise, Outputs
 from study.records.prepared import FORCE, Prepared
-from study.records.record import ALONE, MOTIONS, Sensor
+from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
 from study.support.least_squares import least_squares
@@ -204,14 +204,13 @@ def respond(
 
 def limit_share(fits: Sequence[FreeRunFit], present: PresentTest, design: Design, limits: Limits) -> float:
     """Largest displacement, and force on a component, over the limits, whichever model is true; infinite if endless."""
-    sensors = [Sensor(c, MOTIONS[0]) for c in fits[0].model.coordinates]
-    sensors = [Sensor(ALONE, FORCE)] if present.prescribed else sensors
+    sensors = [Sensor(c, FORCE if present.prescribed else MOTIONS[0]) for c in fits[0].model.coordinates]
     try:
         largest = max(float(np.max(np.abs(respond(fit, design, sensors)[0]))) for fit in fits)
     except StudyError:
         return np.inf
     if present.prescribed:
-        stroke = float(np.max(np.abs(design.record[MOTIONS[0]])))
+        stroke = float(np.max(np.abs(design.record.columns(present.drivers))))
         return max(largest / limits.force, stroke / limits.displacement)
     return largest / limits.displacement
 

@@ -130,6 +130,8 @@ def diagnose(
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
     if elsewhere or found.verdict == NOTHING or not (named := [*found.sets, *found.candidates][:1]):
         return found
+    if named[0].prediction.above_noise <= TOLERANCE:
+        return found
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
     other = None if changes is None else _changing(changes, comparison, base, tried, entries, progress, beside=True)

@@ -7,6 +7,7 @@ The text is parsed by Python's own parser and each part compared with a whitelis
 import ast
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from threading import Lock
 
 from study.equations.graph import Graph, Op
@@ -29,8 +30,9 @@ class ExpressionError(StudyError):
     """A formula that is not of the whitelisted kind."""
 
 
+@lru_cache(maxsize=1024)
 def parse(text: str) -> ast.expr:
-    """Check the outer form of a formula and return its syntax tree."""
+    """Check the outer form of a formula and return its syntax tree, which is not to be changed."""
     if len(text) > CHARACTERS:
         raise ExpressionError(f"the expression has {len(text)} characters; at most {CHARACTERS} are read")
     if not text.isascii() or "\x00" in text:
@@ -49,12 +51,13 @@ def parse(text: str) -> ast.expr:
     return tree
 
 
-def names(text: str) -> list[str]:
+@lru_cache(maxsize=1024)
+def names(text: str) -> tuple[str, ...]:
     """The names a formula uses, functions and pi aside, in alphabetical order."""
     tree = parse(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
-    return sorted(used - {"pi"})
+    return tuple(sorted(used - {"pi"}))
 
 
 def add_formula(graph: Graph, text: str, known: Mapping[str, int]) -> int:

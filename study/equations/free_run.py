@@ -151,15 +151,12 @@ class FreeRun:
 
         ``initial`` gives the state of those segments that begin anew, by their numbers; the first, 0, is one of them.
         """
-        bounds = (0, *self.cuts, self.samples)
-        states, state = np.empty((len(bounds) - 1, self.states)), np.empty((1, self.states, 1))
-        room = np.empty((self.length, len(self.motion.observed), 1))
-        for i, segment in enumerate(pairwise(bounds)):
-            if i in initial:
-                state[0, :, 0] = initial[i]
-            states[i] = state[0, :, 0]
-            self._integrate(self.motion, segment, state, room)
-        return states
+        firsts, anew = np.array((0, *self.cuts)), sorted(initial)
+        motion = replace(self.motion, observed=np.arange(self.states))  # a row of a program is a state before all else
+        state = np.stack([np.asarray(initial[i], dtype=np.float64) for i in anew])[:, :, np.newaxis]
+        out = np.empty((self.length, self.states, 1))
+        self._integrate(motion, (*firsts[anew].tolist(), self.samples), state, out)
+        return out[self.along(firsts.tolist()), :, 0]
 
     def _integrate(self, motion: MotionProgram, cuts: Sequence[int], states: Floats, out: Floats) -> None:
         """What is observed, and derivatives, into ``out``; ``states`` become those at which the next segments begin."""

@@ -135,8 +135,8 @@ def written(model: Model) -> str:
 def check(model: Model) -> None:
     """Refuse a structure that no equation of motion holds for, whatever its values.
 
-    Each coordinate has inertia and something that acts on it, and no two terms at one place are the same, or such that
-    no record could tell them apart.
+    Each coordinate has inertia, or none has in a component test, and something that acts on it, and no two terms at one
+    place are the same, or such that no record could tell them apart.
     """
     masses, acted = set[str](), {where for _, where in model.forces}
     # By what terms lie between; couplings of inertia are another thing than an inertia between two.
@@ -147,13 +147,16 @@ def check(model: Model) -> None:
         if model.modal:
             sentence = "is linear, and 'linear: modal' holds it already; expected nonlinear terms alone"
             expect(entry.term.name not in LINEAR, f"{entry.name} {sentence}")
+    component = not (masses or model.modal)
+    where = model.coordinates[0]
     expect(
-        masses or model.modal or not acted,
-        f"no coordinate has inertia; expected {{term: inertia, at: {model.coordinates[0]}}}, or for a component test a "
-        "model without 'coordinates', on a record of its force and of the one displacement across it",
+        not component or model.forces or not acted,
+        f"no coordinate has inertia; expected {{term: inertia, at: {where}}}, or for a component test, whose motion is "
+        f"prescribed, the forces that were measured, such as forces: {{load: {where}}}",
     )
     for name in () if model.modal else model.coordinates:
-        expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
+        sentence = f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}"
+        expect(component or name in masses, sentence)
         loose = f"nothing ties the coordinate {name!r} to another or drives it"
         expect(name in acted, f"{loose}; expected a term between it and another, or a force")
     for entries in groups.values():

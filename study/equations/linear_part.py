@@ -192,7 +192,7 @@ class Modes:
 
 
 def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None = None) -> Modes:
-    """Modes of a structure whose values are all known.
+    """Modes of a structure whose values are all known; none of a component, whose motion is prescribed.
 
     Parameters
     ----------
@@ -203,6 +203,8 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
     covariance : array, shape (keys, keys)
         Of these.
     """
+    if model.prescribed:
+        return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(model.coordinates))) for _ in range(2)))
     mass = checked_mass_matrix(model)
     values = model.numbers()
     stiffness, damping, _ = matrices(model, values)

@@ -108,6 +108,11 @@ class Model:
         return tuple(c for c in self.coordinates if c in at)
 
     @property
+    def prescribed(self) -> bool:
+        """Whether nothing of it has inertia: it is a component, whose motion is prescribed and force predicted."""
+        return not (self.modal or self.inertial)
+
+    @property
     def values(self) -> dict[str, float | None]:
         """Every coefficient and shape parameter by key, then every number of its modes."""
         own = {key: value for t in self.terms for key, value in t.values.items()}

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from study.compare.comparison import Comparison
+from study.compare.loops import along_what, stroke_of
 from study.explore.axis_scales import Columns, Focus, heard, highest, log_axis, log_ticks
 from study.explore.cards import history_height
 from study.explore.check_columns import FREE, PRESCRIBED, kind_of
 from study.explore.page_units import Scale, in_text
 
 Row = tuple[str, str, Any]
-DECADES = 300.0  # from the end of an axis of frequency down to its first decade
 
 
 def record_axes(comparison: Comparison, columns: Mapping[str, Columns]) -> list[Row]:
@@ -28,7 +28,8 @@ def record_axes(comparison: Comparison, columns: Mapping[str, Columns]) -> list[
         *(("range_time", f"{reset}{name}", at) for name, at in ends.items() for reset in ("", "reset_")),
         ("range_frequency", "end", last),
         ("range_frequency", "tags", [float(np.min(frequency[heard(comparison, frequency)], initial=last))]),  # of log f
-        ("frequency_decades", "ticks", log_ticks(last / DECADES, last)),
+        # the first decade of an axis of frequency lies so far below its end
+        ("frequency_decades", "ticks", log_ticks(last / 300.0, last)),
         ("range_force", "start", limits[0]), ("range_force", "end", limits[1]),
         ("force_ticks", "ticks", log_ticks(*limits)), ("history_ticks", "ticks", log_ticks(*log_axis(*history))),
         ("range_history", "factors", columns["history"]["name"][::-1]),
@@ -51,11 +52,13 @@ def sensor_axes(focus: Focus, columns: Mapping[str, Columns]) -> list[Row]:
     """Those of the panels that show one sensor, and the logarithmic ones of what is drawn of it."""
     kind, record, quantity = kind_of(focus.comparison), focus.comparison.record, focus.sensor.sensor.motion
     y, d, u, v = (in_text(s.unit) for s in (focus.response, focus.difference, focus.displacement, focus.velocity))
+    stroke = along_what(stroke_of(focus.comparison.model, focus.sensor.sensor.coordinate))
+    of = f"{stroke} " if stroke else ""
     drive = in_text(record.unit(record.forces[0])) if record.forces else ""  # a structure's decay has none
     labels = {
         "response_y": f"{quantity} / {y}", "close_y": f"{quantity} / {y}", "difference_y": f"difference / {d}",
         "spectrum_y": f"density / ({d}/√Hz)", "loop_u_y": f"force / {y}", "loop_v_y": f"force / {y}",
-        "loop_u_x": f"displacement / {u}", "loop_v_x": f"velocity / {v}", "cycles_x": f"stroke / {u}",
+        "loop_u_x": f"{of}displacement / {u}", "loop_v_x": f"{of}velocity / {v}", "cycles_x": f"stroke / {u}",
         "cycles_y": f"energy / ({y} {u})",
         **dict.fromkeys(("decay_frequency_x", "decay_damping_x"), f"amplitude / {y}"),
         "frf_y": f"stiffness / ({y}/{u})" if kind == PRESCRIBED else f"magnitude / ({y}/{drive})",

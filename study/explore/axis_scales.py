@@ -20,7 +20,6 @@ from study.support.arrays import Floats
 Columns = dict[str, Any]
 LEAST = 0.005  # of the rms force
 CLOSE, SHORT, LONG = 0.5, 1.4, 2.6  # decades of an axis with even ticks, three or two in a decade
-TICKS = 5.0  # of a longer axis
 MARGIN = 1.2  # by which an axis reaches beyond what it shows, at most
 
 
@@ -120,7 +119,7 @@ def log_ticks(low: float, high: float) -> list[float]:
     if reach < CLOSE:
         return even_ticks(low / MARGIN, high * MARGIN)
     mantissas = (1.0, 2.0, 5.0) if reach < SHORT else (1.0, 3.0) if reach < LONG else (1.0,)
-    every = max(1, math.ceil(reach / TICKS))
+    every = max(1, math.ceil(reach / 5.0))  # five ticks or so
     first, last = math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1
     return [m * 10.0**power for power in range(first, last + 1) if power % every == 0 for m in mantissas]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from study.compare.comparison import Comparison
-from study.explore import check_plots, plots, theme
+from study.explore import plots, theme
 from study.explore.check_columns import DRIVEN, FREE, PRESCRIBED, kind_of
 
 
@@ -89,14 +89,14 @@ def drawn(names: Collection[str], s: plots.Sources) -> dict[str, Any]:
         "spectrum": lambda: plots.spectrum(s, frequency), "sensors": lambda: plots.sensors(s),
         "plane": lambda: plots.plane(s), "against_u": lambda: plots.against(s, "u"),
         "against_v": lambda: plots.against(s, "v"), "lacking": lambda: plots.lacking(s, frequency),
-        "stiffness": lambda: plots.stiffness(s, frequency), "frf": lambda: check_plots.magnitude(s, frequency),
-        "phase": lambda: check_plots.phase(s, frequency), "linearity": lambda: check_plots.linearity(s, frequency),
-        "loop_u": lambda: check_plots.loop(s, "u"), "loop_v": lambda: check_plots.loop(s, "v"),
-        "cycles": lambda: check_plots.cycles(s),
-        "decay_frequency": lambda: check_plots.decay(s, "frequency", "frequency / Hz"),
-        "decay_damping": lambda: check_plots.decay(s, "damping", "damping ratio / %"),
-        "autocorrelation": lambda: check_plots.correlation(s, "autocorrelation", "autocorrelation / 1"),
-        "with_force": lambda: check_plots.correlation(s, "with_force", "correlation / 1"),
-        "histogram": lambda: check_plots.histogram(s),
+        "stiffness": lambda: plots.stiffness(s, frequency), "frf": lambda: plots.magnitude(s, frequency),
+        "phase": lambda: plots.phase(s, frequency), "linearity": lambda: plots.linearity(s, frequency),
+        "loop_u": lambda: plots.loop(s, "u"), "loop_v": lambda: plots.loop(s, "v"),
+        "cycles": lambda: plots.cycles(s),
+        "decay_frequency": lambda: plots.decay(s, "frequency", "frequency / Hz"),
+        "decay_damping": lambda: plots.decay(s, "damping", "damping ratio / %"),
+        "autocorrelation": lambda: plots.correlation(s, "autocorrelation", "autocorrelation / 1"),
+        "with_force": lambda: plots.correlation(s, "with_force", "correlation / 1"),
+        "histogram": lambda: plots.histogram(s),
     }  # fmt: skip
     return {name: draw[name]() for name in names}

@@ -1,4 +1,4 @@
-"""Columns of what shows a test of its kind and of the checks of the residual, for the panels of ``check_plots``."""
+"""Columns of what shows a test of its kind and of the checks of the residual, for the panels of ``plots``."""
 
 import math
 
@@ -54,14 +54,12 @@ def _decay(focus: Focus) -> dict[str, Columns]:
 
 def _loops(focus: Focus) -> dict[str, Columns]:
     """Force, measured and predicted, beside the motion that was prescribed; and what each cycle takes of energy."""
-    seen, prepared = focus.sensor, focus.comparison.prepared
-    part = prepared.record.part(*prepared.plan.judge)
-    some = slice(None, None, -(-len(part) // (2 * BUCKETS)))  # dots: a loop is as well seen in every second of them
-    found = loops(focus.comparison.prediction)
+    seen, found = focus.sensor, loops(focus.comparison, focus.number)
+    some = slice(None, None, -(-len(seen.measured) // (2 * BUCKETS)))  # dots: a loop is as well seen in some of them
     along, size = focus.displacement.factor, focus.response.factor
     return {
         "loops": {
-            "u": part["displacement"][some] / along, "v": part["velocity"][some] / focus.velocity.factor,
+            "u": found.displacement[some] / along, "v": found.velocity[some] / focus.velocity.factor,
             "measured": seen.measured[some] / size, "predicted": seen.predicted[some] / size,
         },
         "cycles": {

@@ -13,14 +13,13 @@ from pathlib import Path
 
 from study.equations.model import Model
 from study.explore import session as sessions
-from study.explore.saved_files import PAGE, files, of_stage
+from study.explore.saved import PAGE, files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
 from study.support.files import write_files
 
 VALUES = "values"  # how to save a model: with what was fitted
 Drawn = Mapping[str, bytes]
-SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the processors
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ class Desk:
             raise OvertakenError
 
     def _examine(self, own: object = None) -> None:
-        self._rest.wait(SETTLE)
+        self._rest.wait(0.4)  # seconds in which pages are drawn, before a diagnosis takes the processors
         asked = self.session
         model = asked.now.model
         if asked.now.diagnosis is not None and own is None:

@@ -10,9 +10,8 @@ from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, html_page
 from study.explore.axis_scales import Columns
-from study.explore.by_record import worst
 from study.explore.desk import Desk
-from study.explore.session import Session
+from study.explore.session import Session, worst
 from study.explore.view import View, over_time, would_differ
 
 HELLO = "hello"  # what a page says when it is there

@@ -1,4 +1,7 @@
-"""A session as one HTML file: every model of the session, no server, no network, the same bytes from the same input."""
+"""A session as one HTML file, every model of it, no server, no network, the same bytes from the same input.
+
+And what Save writes beside: the model file with its comments, the history, the pictures.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -10,16 +13,20 @@ from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
 
+from study.compare import history
 from study.compare.comparison import Comparison
+from study.compare.comparison_report import as_json, comparison_document, tables
 from study.diagnose.confirmed_faults import Diagnosed
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.needless import Needless
+from study.equations import model_file
 from study.explore import html_page
 from study.explore.axis_scales import Columns
-from study.explore.by_record import worst
 from study.explore.html_page import ROOT, Page, template
-from study.explore.session import Session, begin_with, with_diagnosis, with_stage
+from study.explore.session import Session, Stage, begin_with, with_diagnosis, with_stage, worst
 from study.explore.view import View
 from study.faults.accounting import Accounted
+from study.support.extras import undrawn
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
@@ -102,3 +109,58 @@ def _numbered(content: Any) -> tuple[Any, dict[str, str]]:
         return known.setdefault(item, f"e{len(known) + 1}") if isinstance(item, str) else walk(item)
 
     return walk(content), known
+
+
+PAGE = "explore.html"
+
+
+def files(
+    session: Session, name: str, text: str, values: bool = False, drawn: Mapping[str, bytes] | None = None
+) -> dict[str, bytes]:
+    """Contents by file name, of a session whose model came from a file of this name and text: its comments stay.
+
+    With ``values`` the model file gives what was fitted, and a fit of it holds that; otherwise what the session holds.
+    ``drawn`` is what :func:`of_stage` gives of the present model, where that is known.
+    """
+    now = session.now
+    model = now.model.with_values(now.values) if values else now.model
+    for one in session.several.separate:  # terms that tell the records of this session apart belong to it alone
+        for term in [t.name for t in model.terms if set(t.symbols) & set(one.differences)]:
+            model = model.without_term(term)
+    shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
+    steps = session.steps
+    return {
+        name: model_file.revised(text, name, model).encode(),
+        history.name_for(name): history.as_bytes(steps),
+        **_history_picture(steps, name.rpartition(".")[0] or name),
+        PAGE: saved(session),
+        **shown,
+    }
+
+
+def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:
+    """Tables of one model, and pictures if they can be drawn, on each of its records and, if ``by_level``, by level."""
+    each = now.on_each or (now.comparison,)
+    levels = now.by_record.levels if now.by_record is not None and by_level else ()
+    contents = {
+        "comparison.json": as_json(comparison_document(each, levels)),
+        **{f"{table}.csv": content for table, content in tables(each, levels).items()},
+    }
+    if now.diagnosis is not None:
+        contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
+    if undrawn():
+        return contents
+    from study.compare.comparison_pictures import comparison_pictures, level_pictures
+
+    for comparison in each:
+        prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
+        contents |= {prefix + name: content for name, content in comparison_pictures(comparison).items()}
+    return contents | level_pictures(levels, now.comparison.record.force_and_length[0])
+
+
+def _history_picture(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
+    if undrawn():
+        return {}
+    from study.compare.history_picture import history_files
+
+    return history_files(steps, name)

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from study.compare.comparison import Comparison, compare, on_each_record
+from study.compare import each_record
+from study.compare.comparison import Comparison, across_records, compare, on_each_record
 from study.compare.comparison_report import history_step
+from study.compare.each_record import Separate
+from study.compare.fitted_coefficients import Level
 from study.compare.missing_force import Unbalanced, unbalanced
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
@@ -25,15 +28,36 @@ from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
 from study.equations.model import Model, free
 from study.equations.terms import Term, custom, is_own
-from study.explore.by_record import ByRecord, Several, by_record
 from study.faults.accounting import Accounted
 from study.records.prepared import Prepared
+from study.records.record import Record
 from study.records.record_layout import records_judged
 from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
 SHOWN = 12  # candidates
+
+
+@dataclass(frozen=True)
+class Several:
+    """What a session needs of its records one by one; empty of one record."""
+
+    apart: tuple[Prepared, ...] = ()  # each made ready by itself
+    records: tuple[Record, ...] = ()  # as they were read
+    separate: tuple[Separate, ...] = ()  # the coefficients that may differ within the one fit, if any were asked for
+
+
+@dataclass(frozen=True)
+class ByRecord:
+    """The coefficients of each record."""
+
+    names: tuple[str, ...] = ()  # of the records, in the order of the levels' entries
+    levels: tuple[Level, ...] = ()
+    errors: tuple[float, ...] = ()  # of each record's own fit, in the order of the records; none in one fit
+    why_not: str = ""  # the sentence on a record to which the model alone cannot be fitted
+
+
 NONE = Several()
 
 
@@ -321,3 +345,32 @@ def tried(session: Session, text: str) -> Session:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))
     return replace(with_stage(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))
+
+
+def of_own(comparisons: Sequence[Comparison]) -> ByRecord:
+    """Comparisons of a model with each record, held against each other as ``study compare`` does."""
+    levels = across_records(comparisons)
+    names = tuple(c.record.name for c in sorted(comparisons, key=lambda c: c.level))
+    return ByRecord(names, levels, tuple(c.prediction.error for c in comparisons))
+
+
+def by_record(several: Several, together: Comparison) -> ByRecord:
+    """The same of the model that was fitted to all records together: fitted to each, from where that fit ended.
+
+    Where some of its coefficients were to differ between records, these are what the one fit has found.
+    """
+    if several.separate:
+        names = tuple(record.name for record in several.records)
+        levels = each_record.levels_by_record(together, several.separate, several.records)
+        return ByRecord(names, levels)
+    start = together.fit.model.numbers()
+    try:
+        return of_own([compare(together.model, prepared, start=start) for prepared in several.apart])
+    except StudyError as error:
+        return ByRecord(why_not=str(error))
+
+
+def worst(each: Sequence[Comparison]) -> int:
+    """The place of the record of which the model misses most; 0 of one record, which has no comparison of its own."""
+    missed = [comparison.prediction.above_noise for comparison in each]
+    return missed.index(max(missed)) if missed else 0

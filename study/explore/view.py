@@ -18,8 +18,8 @@ from study.compare.connection_spectra import DynamicStiffness, dynamic_stiffness
 from study.compare.force_map import CLASSES, cells_of, curve, surface
 from study.compare.links import power_in_blocks, times_of_blocks, visits_in_blocks
 from study.compare.noise import segments_of
-from study.compare.place_pictures import sketch_of
-from study.diagnose.diagnosis_pictures import sketch_of_diagnosis
+from study.compare.place_sketch import sketch_of
+from study.diagnose.diagnosis_sketch import sketch_of_diagnosis
 from study.diagnose.ranked import Ranked
 from study.equations.coefficient_units import units_at
 from study.equations.place import HERE, Place

@@ -4,9 +4,12 @@ import math
 from collections.abc import Sequence
 from html import escape
 
+import numpy as np
+
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
+from study.compare.varying_coefficients import VaryingCoefficient, varying_in_words
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, Diagnosis
@@ -17,8 +20,8 @@ from study.equations.place import place_in_words
 from study.equations.terms import is_own
 from study.explore.page_units import Scale, in_percent, in_sentence, in_text, mass, motion, number, with_error
 from study.explore.session import Stage
-from study.explore.varying_drawing import varying_drawing
 from study.figures.labels import power_of_ten, term_names
+from study.support.arrays import Floats
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
@@ -284,4 +287,47 @@ def _coefficient(coefficient: Coefficient, live: bool, unneeded: Needless | None
         f"<td>{escape(in_words(coefficient.term))}{where}{_unneeded(unneeded, live)}</td>"
         f"<td class='number'>{size}</td><td>{half}</td>"
         f"<td>{escape(in_text(shown.unit))}</td><td>{button}</td></tr>"
+    )
+
+
+def varying_drawing(one: VaryingCoefficient) -> str:
+    """The coefficient along time or its channel with its 95 % band, as SVG in HTML."""
+    width, height, left, top, bottom = 420, 190, 74, 12, 40  # pixels
+    half = 1.96 * one.error
+    low, high = float(np.min(one.value - half)), float(np.max(one.value + half))
+    low, high = (low, high) if high > low else (low - 1.0, high + 1.0)
+    x = left + (one.at - one.at[0]) / (one.at[-1] - one.at[0]) * (width - left - 12)
+
+    def y(values: Floats) -> Floats:
+        return np.asarray(top + (high - values) / (high - low) * (height - top - bottom), dtype=np.float64)
+
+    def points(across: Floats, up: Floats) -> str:
+        return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
+
+    band = points(np.concatenate([x, x[::-1]]), np.concatenate([y(one.value + half), y(one.value - half)[::-1]]))
+    floor, unit = height - bottom, f" / {in_text(one.along_unit)}" if one.along_unit else ""
+    words = [
+        f"<text x='{left - 6}' y='{at:.0f}' text-anchor='end'>{number(value, 4)}</text>"
+        for value, at in ((high, top + 8), (low, floor))
+    ]
+    words += [
+        f"<text x='{at:.0f}' y='{floor + 16}' text-anchor='{anchor}'>{number(float(value), 4)}</text>"
+        for value, at, anchor in ((one.at[0], left, "start"), (one.at[-1], width - 12, "end"))
+    ]
+    words.append(
+        f"<text x='{(left + width) / 2:.0f}' y='{height - 6}' text-anchor='middle'>"
+        f"{escape(one.along.replace('_', ' ') + unit)}</text>"
+    )
+    middle = (top + floor) / 2
+    words.append(
+        f"<text x='12' y='{middle:.0f}' text-anchor='middle' transform='rotate(-90 12 {middle:.0f})'>"
+        f"{escape(f'{one.symbol} / {in_text(one.unit)}')}</text>"
+    )
+    return (
+        f"<svg class='varying' width='{width}' height='{height}' role='img' font-size='11' fill='currentColor'>"
+        f"<title>{escape(varying_in_words(one))}</title>"
+        f"<path d='M{left},{top} V{floor} H{width - 12}' fill='none' stroke='currentColor' stroke-width='0.8'/>"
+        f"<polygon points='{band}' fill='#b5b5b5' fill-opacity='0.7'/>"
+        f"<polyline points='{points(x, y(one.value))}' fill='none' stroke='#1f5fa8' stroke-width='1.8'/>"
+        f"{''.join(words)}</svg>"
     )

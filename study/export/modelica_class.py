@@ -3,9 +3,8 @@
 import re
 
 from study import __version__
-from study.export.exported import Exported, Quantity, identifiers, refuse_sticking
+from study.export.exported import Exported, Quantity, identifiers, named_nodes, refuse_sticking
 from study.export.formula_text import MODELICA, FormulaText
-from study.export.named_nodes import named_nodes
 
 MODELICA_WORDS = (
     "algorithm", "and", "annotation", "block", "break", "class", "connect", "connector", "constant", "constrainedby",

@@ -3,9 +3,8 @@
 from collections.abc import Iterable
 
 from study import __version__
-from study.export.exported import Exported, Quantity, identifiers, refuse_sticking
+from study.export.exported import Exported, Quantity, identifiers, named_nodes, refuse_sticking
 from study.export.formula_text import PYTHON, FormulaText
-from study.export.named_nodes import named_nodes
 
 PYTHON_WORDS = (
     "and", "as", "assert", "async", "await", "break", "class", "continue", "def", "del", "elif", "else", "except",

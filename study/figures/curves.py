@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from study.figures.styles import legend_place
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TWO_SIDED_95 = NormalDist().inv_cdf(0.975)
 
@@ -55,7 +57,7 @@ class InputCoherence:
 
 
 def input_responses(
-    table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None
+    table: "pd.DataFrame", highest: float, drawn: Sequence[str] | None = None
 ) -> tuple[InputResponse, ...]:
     """Frequency response functions of ``frequency_response.csv``, one entry an input.
 
@@ -78,7 +80,7 @@ def input_responses(
     return tuple(found)
 
 
-def coherences(table: pd.DataFrame, highest: float, estimator: str = "miso") -> tuple[InputCoherence, ...]:
+def coherences(table: "pd.DataFrame", highest: float, estimator: str = "miso") -> tuple[InputCoherence, ...]:
     """Cumulative coherences of ``coherence.csv``, one entry an input, in the order of conditioning."""
     if estimator not in set(table["estimator"]):
         known = ", ".join(table["estimator"].unique())
@@ -91,18 +93,18 @@ def coherences(table: pd.DataFrame, highest: float, estimator: str = "miso") -> 
     return tuple(coherences)
 
 
-def _lines(table: pd.DataFrame, highest: float) -> pd.DataFrame:
+def _lines(table: "pd.DataFrame", highest: float) -> "pd.DataFrame":
     return table[(table["frequency"] > 0.0) & (table["frequency"] <= highest)]
 
 
-def _groups(table: pd.DataFrame, column: str) -> list[tuple[Any, pd.DataFrame]]:
+def _groups(table: "pd.DataFrame", column: str) -> "list[tuple[Any, pd.DataFrame]]":
     """Rows by the values of a column, in the order in which those first appear."""
     return [(value, table[table[column] == value]) for value in table[column].unique()]
 
 
-def _column(table: pd.DataFrame, name: str) -> Floats:
+def _column(table: "pd.DataFrame", name: str) -> Floats:
     return table[name].to_numpy(dtype=np.float64)
 
 
-def _complex(table: pd.DataFrame, real: str, imaginary: str) -> Complexes:
+def _complex(table: "pd.DataFrame", real: str, imaginary: str) -> Complexes:
     return (_column(table, real) + 1j * _column(table, imaginary)).astype(np.complex128)

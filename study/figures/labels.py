@@ -2,10 +2,12 @@
 
 import ast
 import math
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.equations import dimensions, formulas, terms
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz", "velocity": "m/s"}
@@ -95,7 +97,7 @@ def quantity(value: float, unit: str) -> str:
     return f"{value / factor:.3g} {dimensions.pretty(shown)}"
 
 
-def estimated(parameters: pd.DataFrame) -> str:
+def estimated(parameters: "pd.DataFrame") -> str:
     """Shape parameters in a case's ``parameters.csv``: ``u_g = 2.5002 ± 0.0011 mm (given 2.5)``; empty if none.
 
     An error that the six decimals shown do not reach is left out.

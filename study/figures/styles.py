@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from matplotlib import style
-
 SHEET = Path(__file__).with_name("study.mplstyle")
 
 
 def in_style() -> AbstractContextManager[None]:
     """Matplotlib's settings within a block."""
+    from matplotlib import style  # which looks of curves, and words of axes, do without
+
     return style.context(SHEET)
 
 

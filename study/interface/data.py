@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study.interface.showing import drawing_axes, pairs_html
+from study.interface.showing import TABLES, drawing_axes, pairs_html
 from study.records import record as records
 from study.support.errors import StudyError
+from study.support.extras import needed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,6 +72,7 @@ class Record(records.Record):
 
     def to_frame(self) -> "pd.DataFrame":
         """The channels as columns, indexed by the time in seconds."""
+        needed(*TABLES)
         import pandas as pd
 
         return pd.DataFrame(dict(self.channels), index=pd.Index(self.time, name="time"))

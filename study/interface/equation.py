@@ -12,8 +12,9 @@ from study.equations.model import ModelTerm
 from study.equations.place import HERE, Kind, Place
 from study.equations.redundancy import repeated_force
 from study.interface.data import Record
-from study.interface.showing import html_table
+from study.interface.showing import TABLES, html_table
 from study.support.errors import expect
+from study.support.extras import needed
 from study.support.files import replace_file
 
 if TYPE_CHECKING:
@@ -115,6 +116,7 @@ def library(word: str = "") -> "pd.DataFrame":
     Columns are formula, shape parameters, meaning and common cause. ``library("cubic")`` finds every effect with the
     word in its name, formula, meaning or cause.
     """
+    needed(*TABLES)
     import pandas as pd
 
     found = terms.find_terms(word) if word else tuple(terms.LIBRARY.values())

@@ -21,10 +21,11 @@ from study.interface.data import Record
 from study.interface.equation import Model, Samples, Times
 from study.interface.forces import Force, simulate
 from study.interface.pictures import FitPictures
-from study.interface.showing import Words, html_table
+from study.interface.showing import TABLES, Words, html_table
 from study.records import record as measured
 from study.records.record_layout import Layout
 from study.support.errors import StudyError, expect
+from study.support.extras import needed
 from study.support.files import replace_file
 from study.support.numbers import percent
 from study.support.yaml_text import shown
@@ -118,6 +119,7 @@ class Fit(FitPictures):
 
     def modes(self) -> "pd.DataFrame":
         """The modes of the linear part, one row each: frequency in hertz, damping and shape with standard errors."""
+        needed(*TABLES)
         import pandas as pd
 
         found = self.comparison.modes
@@ -188,6 +190,7 @@ class Fit(FitPictures):
 
     def to_frame(self) -> "pd.DataFrame":
         """The coefficients, one row a key: term, value, standard error, 95 % interval, unit, held or not."""
+        needed(*TABLES)
         import pandas as pd
 
         rows = [
@@ -202,6 +205,7 @@ class Fit(FitPictures):
 
         With the standard error, and the p value that it is the same in all of them (Wald, 1943).
         """
+        needed(*TABLES)
         import pandas as pd
 
         records = list({id(s.source): s.source for s in self.comparison.record.stretches}.values())
@@ -329,8 +333,6 @@ class Fit(FitPictures):
 
     def page(self) -> bytes:
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
-        from study.support.extras import needed
-
         needed("bokeh", "the page", "explore")
         from study.explore.saved import of_comparison
 

@@ -12,8 +12,9 @@ from study.diagnose.user_candidates import check_on, own_candidates, unfitted, u
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
-from study.interface.showing import Words, drawing_axes, html_table
+from study.interface.showing import TABLES, Words, drawing_axes, html_table
 from study.support.errors import expect
+from study.support.extras import needed
 from study.support.numbers import percent
 
 if TYPE_CHECKING:
@@ -178,6 +179,7 @@ class Diagnosis:
 
     def to_frame(self) -> "pd.DataFrame":
         """Every candidate, best first, indexed by name."""
+        needed(*TABLES)
         import pandas as pd
 
         rows = [
@@ -194,9 +196,9 @@ class Diagnosis:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Share of the held-out difference that each of the first candidates explains."""
-        from study.diagnose.diagnosis_pictures import ranking
-
         with drawing_axes(ax) as (axes,):
+            from study.diagnose.diagnosis_pictures import ranking
+
             return ranking(axes, self.result)
 
     def plot_constancy(self, ax: "Axes | None" = None, *, along: str = "amplitude") -> "Axes":
@@ -204,10 +206,10 @@ class Diagnosis:
 
         Relative to its value, with 95 % intervals.
         """
-        from study.diagnose.diagnosis_pictures import FOLLOWED, followed
-
         expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
         with drawing_axes(ax) as (axes,):
+            from study.diagnose.diagnosis_pictures import FOLLOWED, followed
+
             return followed(axes, self.result.candidates[:FOLLOWED], along)
 
     def __repr__(self) -> str:

@@ -16,10 +16,11 @@ from study.identify.frequency_domain.conditioned import MisoResult
 from study.interface.data import Record
 from study.interface.equation import Model
 from study.interface.fitted import records_of
-from study.interface.showing import drawing_axes, html_table
+from study.interface.showing import TABLES, drawing_axes, html_table
 from study.records.prepared import prepare_record
 from study.records.spectra import Segments
 from study.support.errors import StudyError, expect
+from study.support.extras import needed
 from study.way_in.compare_records import driven_alike
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class Identification:
 
     def to_frame(self) -> "pd.DataFrame":
         """Parameters, one row a name, with their standard errors."""
+        needed(*TABLES)
         import pandas as pd
 
         rows = [{"parameter": p.name, "value": p.value, "error": p.error} for p in self.result.parameters]
@@ -78,6 +80,7 @@ class Identification:
 
     def responses(self) -> "pd.DataFrame":
         """A_j(f), one row an input and line: real and imaginary part, standard error, and what coherences there are."""
+        needed(*TABLES)
         import pandas as pd
 
         found, analysis = self._responses(), self._coherences()
@@ -102,12 +105,13 @@ class Identification:
         StudyError
             If there is no such input, or the estimator has no frequency response functions.
         """
-        from study.figures import frequency_response
         from study.figures.labels import formula, response_unit
 
         expect(part in ("magnitude", "phase"), f"part is {part!r}; expected magnitude or phase")
         curve, units = self._curve(number), self.record.units
         with drawing_axes(ax) as (axes,):
+            from study.figures import frequency_response
+
             if part == "phase":
                 frequency_response.phase_panel(axes, curve)
             else:
@@ -125,7 +129,6 @@ class Identification:
         StudyError
             If the estimator has none.
         """
-        from study.figures import coherence
         from study.figures.curves import InputCoherence
 
         analysis = self._coherences()
@@ -137,6 +140,8 @@ class Identification:
             for j, item in enumerate(self.result.inputs)
         ]
         with drawing_axes(ax) as (axes,):
+            from study.figures import coherence
+
             coherence.cumulative_panel(axes, shares)
             axes.set_xlim(0.0, self.heard)
             axes.set_ylabel("cumulative coherence")

@@ -25,11 +25,11 @@ class FitPictures:
 
         Of a structure that of a ``sensor`` by its name, or of the one that the model misses most.
         """
-        from study.compare.panels import response_panel
-
         prediction = self._seen(sensor)
         part = prediction.closeup if closeup else slice(None)
         with drawing_axes(ax) as (axes,):
+            from study.compare.panels import response_panel
+
             response_panel(
                 axes, prediction.time[part], prediction.measured[part], prediction.predicted[part],
                 self._unit(prediction),
@@ -40,10 +40,10 @@ class FitPictures:
 
     def plot_residual(self, ax: "Axes | None" = None, *, sensor: str | None = None) -> "Axes":
         """What the model misses of the judging part beside twice the noise floor; ``sensor`` as for :meth:`plot`."""
-        from study.compare.panels import residual
-
         prediction = self._seen(sensor)
         with drawing_axes(ax) as (axes,):
+            from study.compare.panels import residual
+
             residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit(prediction))
             axes.legend(loc="upper right")
         return axes
@@ -63,7 +63,7 @@ class FitPictures:
         functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
         with drawing_axes(ax) as (axes,):
             if part == "magnitude":
-                drive = drive_of(self.comparison.prepared)
+                drive = drive_of(self._seen(None))
                 unit = f"{self._unit(self._seen(None))}/{self.comparison.record.units.get(drive, '')}"
                 return fit_panels.response_magnitude(axes, functions, unit, highest)
             return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
@@ -100,7 +100,6 @@ class FitPictures:
         Of a structure that at the place where most is missing.
         """
         from study.compare.force_map import curve
-        from study.compare.panels import force_curve
         from study.support.errors import expect
 
         expect(against in ("displacement", "velocity"), f"against is {against!r}; expected displacement or velocity")
@@ -109,21 +108,22 @@ class FitPictures:
             units |= self.comparison.missing.units(self.comparison.place.label)
         motion = lacking.displacement if against == "displacement" else lacking.velocity
         with drawing_axes(ax) as (axes,):
+            from study.compare.panels import force_curve
+
             return force_curve(axes, curve(motion[lacking.inner], lacking.force[lacking.inner]), against, units)
 
     def plot_force_error(self, ax: "Axes | None" = None) -> "Axes":
         """Unexplained share of the force by frequency."""
-        from study.compare.panels import force_error_panel
-
         _of_one_mass(self.comparison, "plot_force_error")
         with drawing_axes(ax) as (axes,):
+            from study.compare.panels import force_error_panel
+
             drawn = force_error_panel(axes, self.comparison.force, self.comparison.force.highest)
             drawn.legend(loc="upper right")
         return drawn
 
     def plot_varying(self, coefficient: str | None = None, ax: "Axes | None" = None) -> "Axes":
         """A coefficient that varies along time or its channel with its 95 % band: by its name, or the first."""
-        from study.compare.varying_coefficients import varying_panel
         from study.support.errors import expect
 
         found = {one.symbol: one for one in self.comparison.varying}
@@ -132,6 +132,8 @@ class FitPictures:
         expect(there, f"no {coefficient or 'coefficient'} varies in this model; expected one of {known}")
         one = found[coefficient or next(iter(found))]
         with drawing_axes(ax) as (axes,):
+            from study.compare.varying_pictures import varying_panel
+
             varying_panel(axes, one)
             axes.legend(loc="best")
             axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}")

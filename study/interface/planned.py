@@ -19,8 +19,9 @@ from study.diagnose.next_test_report import (
 from study.diagnose.precision import PreciseTest, precise_test
 from study.diagnose.separation import limits_asked, rivals_of
 from study.diagnose.verdict import Diagnosis
-from study.interface.showing import Words, drawing_axes
+from study.interface.showing import TABLES, Words, drawing_axes
 from study.support.errors import expect
+from study.support.extras import needed
 from study.support.files import write_files
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class PlannedTest:
 
     def to_frame(self) -> "pd.DataFrame":
         """What drives it, one column a channel, by time in seconds; empty where it is let go."""
+        needed(*TABLES)
         import numpy as np
         import pandas as pd
 
@@ -82,9 +84,9 @@ class PlannedTest:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """What each rival would answer, where they differ most; of a test for a value's sake what drives it."""
-        from study.diagnose.next_test_pictures import answers_panel
-
         with drawing_axes(ax) as (axes,):
+            from study.diagnose.next_test_pictures import answers_panel
+
             if isinstance(self.result, PreciseTest):
                 frame = self.to_frame()
                 for name in frame.columns:

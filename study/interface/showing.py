@@ -5,10 +5,13 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING
 
+from study.support.extras import DRAWING, needed
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDTH, HEIGHT = 7.0, 2.6  # inches of one panel
+TABLES = ("pandas", "a table in a notebook", "notebook")  # what ``extras.needed`` asks for
 
 
 class Words(str):
@@ -44,6 +47,7 @@ def drawing_axes(ax: "Axes | None", rows: int = 1) -> "Generator[list[Axes]]":
     """The axes to draw on, in the project's style: those given, or those of a new figure of pyplot."""
     from study.figures.styles import in_style
 
+    needed(*DRAWING)
     with in_style():
         if ax is not None:
             yield [ax]

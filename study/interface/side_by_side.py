@@ -12,9 +12,10 @@ import numpy as np
 from study.compare import comparison as comparisons
 from study.compare.fitted_coefficients import Level
 from study.interface.fitted import Fit
-from study.interface.showing import drawing_axes, html_table
+from study.interface.showing import TABLES, drawing_axes, html_table
 from study.support import statistics
 from study.support.errors import expect
+from study.support.extras import needed
 from study.support.numbers import percent
 from study.support.yaml_text import shown
 
@@ -45,6 +46,7 @@ class Across:
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a coefficient and record: rms force, value, standard error, unit, p value, and whether it moves."""
+        needed(*TABLES)
         import pandas as pd
 
         rows = [
@@ -57,13 +59,13 @@ class Across:
 
     def plot(self, key: str | None = None, ax: "Axes | None" = None) -> "Axes":
         """One coefficient against the rms force; that which moves most surely if none is named."""
-        from study.compare.panels import coefficient_by_level
-
         found = {level.key: level for level in self.levels}
         expect(found, "every coefficient was held; expected a model that leaves one open")
         name = key or min(self.levels, key=lambda level: level.p_value).key
         expect(name in found, f"{name!r} was not fitted; expected one of {', '.join(found)}")
         with drawing_axes(ax) as (axes,):
+            from study.compare.panels import coefficient_by_level
+
             unit = self.fits[0].record.units.get("force", "N")
             return coefficient_by_level(axes, found[name], unit)
 
@@ -117,6 +119,7 @@ class Ranking:
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a model, indexed by its name."""
+        needed(*TABLES)
         import pandas as pd
 
         return pd.DataFrame([vars(row) for row in self.rows]).set_index("name")

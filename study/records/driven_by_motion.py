@@ -6,13 +6,14 @@ unit mass. A component's motion is prescribed and measured: its velocity is want
 difference.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from study.records.completion import consistent, derivative
 from study.records.noise_floor import floor
-from study.records.record import FORCE, MOTIONS, OF_THE_GROUND, SI_UNITS, Record
+from study.records.record import FORCE, MOTIONS, OF_THE_GROUND, SI_UNITS, Record, Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, at, expect
@@ -22,9 +23,6 @@ from study.support.units import parse_unit
 BASE = tuple(f"base_{motion}" for motion in MOTIONS)
 SAID = "the base moves: its acceleration, the other way round, is the force"
 PER_MASS = "all coefficients are per unit mass (give the inertia in the model for those of the structure)"
-LIKE = 0.02  # of its rms: a velocity that differs by less from a difference of the displacement is that difference
-ABOVE = 10.0  # the motion is followed up to the highest line at which it stands so many times above its noise
-DIGITAL = 0.95  # of all changes that are whole steps: then a displacement is digitised
 
 
 def on_a_moving_base(record: Record) -> bool:
@@ -88,26 +86,58 @@ def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
     loops of force over velocity that are none: it gives way to the derivative of the displacement. That is taken, here
     and where no velocity was measured, up to the frequency at which the motion drowns in its noise.
     """
-    if "displacement" not in record:
-        return record, ()
     record, notes = consistent(record)
-    u = record["displacement"]
-    if "velocity" in record:
-        difference = np.diff(u, prepend=u[0]) / record.dt
-        size = float(np.std(record["velocity"]))
-        if size == 0.0 or float(np.std(record["velocity"] - difference)) > LIKE * size:
-            return record, notes
-        notes = (*notes, "the velocity in the file is the difference to the sample before, which lags by half a sample")
-    u = _without_flicker(u)
-    cut = Segments(segment_length(len(u), held=4, most=256))
-    frequency, power = autospectrum(u - np.mean(u), record.dt, cut)
-    noise = floor(u - np.mean(u), record.dt).noise ** 2 * 2.0 * record.dt
-    above = np.flatnonzero(power > ABOVE * noise)
-    highest = float(frequency[above[-1]]) if len(above) else 0.5 / record.dt
-    velocity = _smooth_slope(u, record.dt, highest)
-    channels = {"velocity": velocity, "acceleration": np.gradient(velocity, record.dt)}
-    said = f"velocity is the derivative of the displacement below {highest:.3g} Hz, above which that is noise"
-    return record.with_channels(channels), (*notes, said)
+    channels, said = dict[str, Floats](), list(notes)
+    for coordinate in record.coordinates:
+        displacement, velocity, acceleration = (Sensor(coordinate, motion) for motion in MOTIONS)
+        if displacement not in record:
+            continue
+        u = record[displacement]
+        if velocity in record:
+            difference = np.diff(u, prepend=u[0]) / record.dt
+            size = float(np.std(record[velocity]))
+            # a velocity that differs from a difference of the displacement by 2 % of its rms is that difference
+            if size == 0.0 or float(np.std(record[velocity] - difference)) > 0.02 * size:
+                continue
+            lags = "which lags by half a sample"
+            said.append(f"the {velocity} in the file is the difference to the sample before, {lags}")
+        u = _without_flicker(u)
+        cut = Segments(segment_length(len(u), held=4, most=256))
+        frequency, power = autospectrum(u - np.mean(u), record.dt, cut)
+        noise = floor(u - np.mean(u), record.dt).noise ** 2 * 2.0 * record.dt
+        # the motion is followed up to the highest line at which it stands ten times above its noise
+        above = np.flatnonzero(power > 10.0 * noise)
+        highest = float(frequency[above[-1]]) if len(above) else 0.5 / record.dt
+        slope = _smooth_slope(u, record.dt, highest)
+        channels |= {str(velocity): slope, str(acceleration): np.gradient(slope, record.dt)}
+        below = f"below {highest:.3g} Hz, above which that is noise"
+        said.append(f"{velocity} is the derivative of the {displacement} {below}")
+    return record.with_channels(channels), tuple(said)
+
+
+def with_forces_by_coordinate(record: Record, forces: Sequence[tuple[str, str]]) -> Record:
+    """A record whose forces are called after the coordinates that they act on: ``left force``, the sum of those there.
+
+    Raises
+    ------
+    StudyError
+        If one of the coordinates has no motion: of a component all are prescribed.
+    """
+    for coordinate in record.coordinates:
+        expect(
+            any(sensor.coordinate == coordinate for sensor in record.sensors),
+            f"{record.name}: nothing measures the motion of {coordinate!r}, and in a model without inertia all motion "
+            f"is prescribed; expected a column '{coordinate} displacement', or the inertia of what moves by itself",
+        )
+    record, _ = consistent(record)
+    kept = {name: values for name, values in record.channels.items() if name not in record.forces}
+    units = {name: unit for name, unit in record.units.items() if name not in record.forces}
+    for name, coordinate in forces:
+        own = str(Sensor(coordinate, FORCE))
+        kept[own] = kept.get(own, 0.0) + record[name]
+        units.setdefault(own, record.unit(name))
+    together = tuple(dict.fromkeys(str(Sensor(coordinate, FORCE)) for _, coordinate in forces))
+    return replace(record, channels=kept, units=units, forces=together)
 
 
 def _without_flicker(u: Floats) -> Floats:
@@ -119,7 +149,8 @@ def _without_flicker(u: Floats) -> Floats:
     change = np.abs(np.diff(u))
     steps = change[change > LAST_DIGITS * float(np.ptp(u))]
     step = float(np.min(steps)) if len(steps) else 0.0
-    if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < DIGITAL:
+    # a displacement is digitised where nearly all changes are whole steps
+    if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < 0.95:
         return u
     held, follower = np.empty_like(u), float(u[0])
     for i, value in enumerate(u.tolist()):

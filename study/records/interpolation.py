@@ -14,7 +14,6 @@ from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
 READINGS = (BAND_LIMITED, "straight", "held")
-CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 
 
 def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
@@ -45,7 +44,8 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
 
 def closes(values: Floats) -> bool:
     """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
-    return _top_energy(values) <= CLOSES * _top_energy(_reflected(values))
+    # a record that does not close has ten times the energy there of one whose ends are continued
+    return _top_energy(values) <= 10.0 * _top_energy(_reflected(values))
 
 
 def _reflected(values: Floats) -> Floats:

@@ -35,7 +35,7 @@ class Outputs:
         if len(self.sensors) == 1:
             return values[:, 0]
         weights = np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
-        return (values * weights).reshape(-1, *values.shape[2:])
+        return (values * weights).reshape(len(values) * len(self.sensors), *values.shape[2:])
 
     def kept(self, lost: Bools) -> Floats:
         """1 for stacked values that count and 0 for those of lost samples, shape (n s,).
@@ -47,14 +47,14 @@ class Outputs:
 
     def apart(self, stacked: Floats) -> Floats:
         """The inverse of :meth:`stacked`: shape (n, sensors, ...), in the units of the sensors."""
-        values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
+        values = stacked.reshape(len(stacked) // len(self.sensors), len(self.sensors), *stacked.shape[1:])
         return values / np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
 
     def whitened(self, stacked: Floats, noise: Noise) -> Floats:
         """Stacked values filtered with the autoregressive coefficients of each sensor's noise, the same shape."""
         if not noise:
             return stacked
-        values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
+        values = stacked.reshape(len(stacked) // len(self.sensors), len(self.sensors), *stacked.shape[1:])
         parts = [whitened(values[:, i], own) for i, own in enumerate(noise)]
         return np.stack(parts, axis=1).reshape(stacked.shape)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.records.record import ALONE, MOTIONS, Record, Sensor
+from study.records.record import FORCE, MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
@@ -52,8 +52,8 @@ def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor,
 
     Or the force, where that is wanted: the motion is prescribed then.
     """
-    if wanted in record.forces:
-        return (Sensor(ALONE, wanted),)
+    if wanted == FORCE and (forces := tuple(s for c in record.coordinates if (s := Sensor(c, FORCE)) in record)):
+        return forces
     found: list[Sensor] = []
     for coordinate in record.coordinates:
         there = [s for m in MOTIONS if (s := Sensor(coordinate, m)) in record]

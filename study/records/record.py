@@ -1,5 +1,6 @@
 """A record: what was measured or simulated, with its units."""
 
+import csv
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from study.records.number_table import number_table
 from study.support.arrays import Floats
+from study.support.csv_text import csv_bytes
 from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
@@ -215,21 +218,18 @@ def record_of(
 
 def write_csv(record: Record, path: Path) -> None:
     """Write time and channels with all digits of a double; units other than SI follow the names."""
-    import pandas as pd  # half a second, which records in memory are spared
-
     columns: dict[str, Floats] = {"time": record.time}
     for channel, values in record.channels.items():
         unit = record.units.get(channel, "")
         columns[channel if unit in ("", record.usual_unit(channel)) else f"{channel} [{unit}]"] = values
-    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")
+    path.write_bytes(csv_bytes(columns, "%.17g"))
 
 
 def read_csv(path: Path) -> Record:
     """Read what :func:`write_csv` wrote of a record in SI units. ``readers`` reads all others."""
-    import pandas as pd
-
-    table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns exactly the doubles that were written
-    time = table["time"].to_numpy(dtype=np.float64)
+    head, _, body = path.read_bytes().partition(b"\n")
+    names = next(csv.reader([head.decode()]))
+    time, *values = np.ascontiguousarray(number_table(body, ",").T)
     dt = round(float(time[-1] - time[0]) / (len(time) - 1), 15)
-    channels = {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns if c != "time"}
+    channels = dict(zip(names[1:], values, strict=True))
     return Record(dt=dt, channels=channels, name=path.parent.name, start=float(time[0]))

@@ -64,7 +64,7 @@ class KindOfTest:
 
     prescribed: bool = False  # it has no inertia: the motion is prescribed, and the force is predicted
     drifts: bool = False  # nothing brings its mass back: the motion is judged over a horizon
-    unbroken: bool = False  # it wants one long stretch to fit and one to judge
+    unbroken: bool = False  # it wants long stretches: the first half of each is fitted, the second judged
     anew: float = (
         0.0  # periods after which a free motion begins anew; 0 where it runs on through the other part's blocks
     )
@@ -101,8 +101,8 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     anew = kind.anew if free else 0.0
     several = len(records) > 1 or len(layout.use) > 1
     by_itself = (free or kind.prescribed or kind.varies) and not (layout.explicit or kind.unbroken)
-    turns = several or layout.alternate or by_itself
-    if not (turns or layout.use or kind.drifts):
+    turns = (several and not kind.unbroken) or layout.alternate or by_itself
+    if not (turns or several or layout.use or kind.drifts):
         with at(records[0].name):
             plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         silent = falls_silent(records[0], sensors, plan.fit, plan.judge)
@@ -112,7 +112,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
             return replace(prepared, sensors=sensors, notes=(*notes, *prepared.notes))
         notes += [_why(records[0], plan, silent=silent)] if turns else []
     completed = [complete(record, layout.cutoff) for record in records]
-    if turns and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
+    if (turns or several) and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
         completed, every = completed_without_spare(completed, sum(len(record) for record in records) // 2)
     if layout.explicit:
         plan = make_plan(records[0], layout.fit, layout.judge, wanted)
@@ -123,11 +123,15 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
             unbroken = [_unbroken(stretch, sensors) for stretch in stretches]
             stretches, notes = [s for s, _ in unbroken], [*notes, *(said for _, said in unbroken if said)]
         stretches = [_until_rest(s, sensors) for s in stretches] if turns and anew else stretches
-        middle = (stretches[0].first + stretches[0].last) // 2
-        fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
+        halves = [
+            (replace(s, last=(s.first + s.last) // 2), replace(s, first=(s.first + s.last) // 2)) for s in stretches
+        ]
+        fit, judge = [first for first, _ in halves], [second for _, second in halves]
         if turns:
             fit, judge = alternating(stretches, sensors, anew)
-        notes += [_said(fit, judge, len(stretches), anew=bool(anew))] if turns else []
+            notes.append(_said(fit, judge, len(stretches), anew=bool(anew)))
+        elif len(stretches) > 1:
+            notes.append(f"of each of {len(stretches)} stretches the first half is fitted and the second judged")
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors, layout.horizon) for part in (fit, judge))
         notes.append(
@@ -157,11 +161,10 @@ def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: Kind
         layout.horizon is None or kind.drifts,
         "--horizon is for a mass that nothing in the model brings back; expected no horizon of a motion about a rest",
     )
-    asked = len(records) > 1 or layout.alternate or layout.use
     expect(
-        not (kind.unbroken and asked),
-        "the linear part of the model is a sum of modes, which are found in one long stretch; expected --fit A:B and "
-        "--judge A:B instead of stretches, and a diagnosis of each record (--each) instead of one of all",
+        not (kind.unbroken and layout.alternate),
+        "the linear part of the model is a sum of modes, which are found in long stretches; expected --fit A:B and "
+        "--judge A:B, or several records, whose first halves are fitted, instead of blocks",
     )
     for record in records if kind.prescribed else ():
         expect(
@@ -278,7 +281,7 @@ def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int, *, a
 
 def period_of(stretch: Stretch, sensors: Sequence[Sensor]) -> float:
     """Samples in a period of the slowest motion; of the displacement where that is prescribed."""
-    seen = [MOTIONS[0] if s.motion == FORCE else s for s in sensors]
+    seen = [Sensor(s.coordinate, MOTIONS[0]) if s.motion == FORCE else s for s in sensors]
     return max(period(stretch.source[s][stretch.first : stretch.last]) for s in seen)
 
 

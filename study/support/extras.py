@@ -5,6 +5,8 @@ from typing import Any
 
 from study.support.errors import StudyError
 
+DRAWING = ("matplotlib", "drawing pictures", "pictures")
+
 
 def lacking(module: str, use: str, extra: str) -> str:
     """A sentence that says what is to be installed for a use; empty where all is there."""
@@ -14,6 +16,18 @@ def lacking(module: str, use: str, extra: str) -> str:
         package = module.partition(".")[0]
         return f"{use} needs {package}; expected an installation with 'pip install reverse-miso-study[{extra}]'"
     return ""
+
+
+def undrawn() -> str:
+    """Why no picture can be drawn, in a sentence; empty where it can."""
+    return lacking(*DRAWING)
+
+
+def lacked(error: ModuleNotFoundError) -> str:
+    """The same of a package that was missing where nothing does without it; empty if it is none of an extra."""
+    package = (error.name or "").partition(".")[0]
+    extra = {"matplotlib": "pictures", "pandas": "workflow", "pydantic": "workflow", "bokeh": "explore"}.get(package)
+    return lacking(package, "this", extra) if extra else ""
 
 
 def needed(module: str, use: str, extra: str) -> Any:

@@ -25,7 +25,6 @@ from study.trials import effects
 from study.trials.effects import HIDDEN, LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_model
 
 TIMED = ("periodic_stiffness", "harmonic_force")  # what knows of time: no program of a test is in step with it
-DAMPED = 2.5  # times as large a share, of the viscous force, is what a hidden damper carries
 TEST_STEPS = 8  # of the integration, a sample
 # The motion that each linear term acts on.
 SHAPES: Mapping[str, str] = MappingProxyType(dict(zip(LINEAR, reversed(MOTIONS), strict=True)))
@@ -54,7 +53,8 @@ def rig_of_a_test(rng: np.random.Generator, asked: Asked, make: Callable[[np.ran
     def effect(term: Term) -> tuple[ModelTerm, float]:
         """Shape, share and sign, in the order in which the published ones were drawn; more of what damps."""
         entry = replace(free(term), coefficients=(1.0,), parameters=effects.drawn_shape(rng, term, quiet))
-        share = float(rng.uniform(*SHARE)) * (DAMPED if damps(_force(entry, quiet)) else 1.0)
+        # a hidden damper carries a larger share, of the viscous force
+        share = float(rng.uniform(*SHARE)) * (2.5 if damps(_force(entry, quiet)) else 1.0)
         opposite = term.either_sign and rng.random() < 0.5 and not term.steady
         return replace(entry, coefficients=(-1.0 if opposite else 1.0,)), share
 

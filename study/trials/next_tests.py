@@ -20,7 +20,6 @@ from study.trials.kept import Row
 from study.way_in.compare_records import compare_records
 
 LOUDER = 2.0  # times what the record reached of force and motion: the limits of the test
-STEPS = 8  # of the integration, a sample
 
 
 def judged_next_test(trial: Trial, seed: int) -> Row:
@@ -75,7 +74,7 @@ def measured_in(trial: Trial, rivals: Rivals, choice: Choice, rng: np.random.Gen
     acting |= {name: between_samples(design.record[name], prepared.every) for name in (*rivals.present.drivers, *moves)}
     sensors = rivals.seen(choice.sensor)[0].sensors
     source = Record(given.dt, acting, given.units, coordinates=given.coordinates, forces=given.forces)
-    run = prepare(trial.truth, source, sensors=sensors, steps_per_sample=STEPS)
+    run = prepare(trial.truth, source, sensors=sensors, steps_per_sample=8)
     shown = run.respond({}, design.begin[: run.moving])[0]
     measured = {
         str(sensor): own + noise * rng.standard_normal(samples)

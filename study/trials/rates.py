@@ -29,7 +29,6 @@ SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE = "the same place", "a place with an en
 NOT_DIAGNOSED = "not_diagnosed"
 # Of which a table says what each would do: a run keeps what its verdict rested on.
 ALPHAS = (1e-4, 1e-3, 0.005, 0.01, 0.02, 0.05, 0.1)
-FACTORS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 NORMAL = float(ndtri(0.975))
 
 
@@ -464,7 +463,7 @@ def against_k(table: pd.DataFrame) -> pd.DataFrame:
     cells = [str(r["rivals"]) for r in rows]  # ``0.00+1.15``; a cell of one number is a number
     rivals = [[float(part) for part in cell.split("+")] if cell not in ("", "nan") else [] for cell in cells]
     lines: list[dict[str, float]] = []
-    for k in FACTORS:
+    for k in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0):
         holds = proportion([float(r["distance"] < k) for r in rows])
         sizes = mean([float(sum(d < k for d in own)) for own in rivals])
         lines.append(

@@ -3,12 +3,12 @@
 import base64
 import binascii
 import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from study.equations.model_file import format_model
 from study.records.record import write_csv
-from study.support.config_files import Section, checked
 from study.support.errors import StudyError, expect
 from study.support.files import read_text, replace_file, replacing
 from study.trials.draw import Trial
@@ -39,7 +39,8 @@ def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     return record, model, answer
 
 
-class Imposed(Section):
+@dataclass(frozen=True)
+class Imposed:
     """A fault of the measurement, as it was put on."""
 
     fault: str
@@ -48,17 +49,14 @@ class Imposed(Section):
     unit: str
 
 
-class Nothing(Section):
-    """No fault."""
-
-
-class Answer(Section):
+@dataclass(frozen=True)
+class Answer:
     """What is sealed."""
 
     hidden: list[str]  # effects
     shares: list[float]  # of the force that each is sized by
     noise: float  # mean square, over that of the response
-    fault: Imposed | Nothing
+    fault: Imposed | None  # None if nothing was put on
     truth: str  # the model that made the record
 
 
@@ -66,14 +64,21 @@ def unseal(path: Path) -> Answer:
     """The answer of a trial; a ``StudyError`` if the file holds none."""
     text = read_text(path, ANSWER_FILE)
     try:
-        page: object = json.loads(text)
-        content: object = json.loads(base64.b64decode(cast(dict[str, Any], page)["answer"], validate=True))
-    except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
+        page = json.loads(text)
+        answer = _answer(json.loads(base64.b64decode(page["answer"], validate=True)))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, binascii.Error):
         raise StudyError(f"{path}: this holds no sealed answer; expected {ANSWER_FILE}") from None
-    answer = checked(Answer, content, f"{path}: the answer in it")
     alike = len(answer.hidden) == len(answer.shares)
     expect(alike, f"{path}: the answer in it has not a share for each effect; expected {ANSWER_FILE}")
     return answer
+
+
+def _answer(content: Any) -> Answer:
+    """What was sealed; any error of a missing key or a wrong type if it is none."""
+    fault = content["fault"]
+    imposed = Imposed(fault["fault"], fault["channel"], float(fault["value"]), fault["unit"]) if fault else None
+    hidden, shares = [str(name) for name in content["hidden"]], [float(share) for share in content["shares"]]
+    return Answer(hidden, shares, float(content["noise"]), imposed, str(content["truth"]))
 
 
 def answer_in_words(answer: Answer) -> str:
@@ -86,7 +91,7 @@ def answer_in_words(answer: Answer) -> str:
     )
     noise = f"noise: {100.0 * answer.noise:g} % of the mean square of the response"
     fault, said = answer.fault, "none"
-    if isinstance(fault, Imposed):
+    if fault is not None:
         unit = "" if fault.unit == "1" else f" {fault.unit}"
         said = f"{fault.fault.replace('_', ' ')} of the {fault.channel}, {fault.value:.4g}{unit}"
     return f"{what}\n{noise}\nfault of the measurement: {said}\nthe model that made the record:\n\n{answer.truth}"

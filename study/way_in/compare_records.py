@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from study.compare.by_estimator import FREE_RUN
-from study.compare.running_on import has_lost_its_way
+from study.compare.comparison import Comparison, compare
+from study.compare.prediction import Prediction
 from study.equations.common_factor import on_moving_ground, per_unit_mass
 from study.equations.equations_of_motion import has_spring
 from study.equations.laid_variations import with_laid_variations
@@ -17,13 +18,14 @@ from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
-from study.records.driven_by_motion import on_a_moving_base, relative_to_base
+from study.identify.time_domain.stretch_states import is_smooth
+from study.records.driven_by_motion import on_a_moving_base, relative_to_base, with_forces_by_coordinate
 from study.records.prepared import Prepared
 from study.records.readers.remarks import LEAVING_OUT
-from study.records.record import Record
+from study.records.record import FORCE, Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 from study.records.sampling_rate import low_passed
-from study.support.errors import expect
+from study.support.errors import StudyError, expect
 
 ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
 
@@ -50,15 +52,21 @@ def made_ready(
         If the records, or the model and such a test, do not go together; of a structure, if nothing measures a
         coordinate or ties it to another, or its masses are not positive definite together.
     """
+    one_mass = len(model.coordinates) == 1 and not (model.modal or model.prescribed)
+    expect(
+        layout.near is None or one_mass,
+        "--near is the mode that a single mass is fitted to; expected --up-to, or all modes, of anything else",
+    )
     model, records, said = driven_alike(records, model, absolute)
     if layout.highest is not None:
         below = [low_passed(record, layout.highest) for record in records]
         records, said = [record for record, _ in below], (*said, below[0][1])
-    prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
-    drifts = not (prescribed or model.modal or has_spring(model))
+    if model.prescribed and model.named:
+        records = [with_forces_by_coordinate(record, model.forces) for record in records]
+    drifts = not (model.prescribed or model.modal or has_spring(model))
     anew = ANEW if len(model.coordinates) > 1 else 0.0
     varies = any(entry.term.variation for entry in model.terms)  # along all of the record
-    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts, model.modal is not None, anew, varies))
+    prepared = laid_out(records, layout, KindOfTest(model.prescribed, drifts, model.modal is not None, anew, varies))
     model = with_laid_variations(model, prepared)
     lacks = _unseen(model, prepared)
     noticed = [f"{r.name}: {remark}" if len(records) > 1 else remark for r in records for remark in r.remarks
@@ -77,7 +85,7 @@ def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
     """
     if not model.named:
         return ()
-    if not model.modal:  # whose masses nobody lumps
+    if model.inertial:  # modes are nobody's lumped masses, and a component has none
         check_held_masses(model)
     blind = [coordinate for coordinate in model.coordinates if coordinate not in prepared.coordinates]
     for name in blind:
@@ -87,6 +95,8 @@ def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
             "a term between it and a coordinate that is measured",
         )
     lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
+    if prepared.response == FORCE:
+        lacks = f"no force was measured at {' and '.join(blind)}: those of the others alone are compared"
     return (lacks,) if blind else ()
 
 
@@ -156,8 +166,37 @@ def compare_records(
         )  # fmt: skip
 
     found = found_in(prepared)
-    if runs_on(prepared):
+    if runs_on(prepared) and (model.states or not model.prescribed):  # what has no state loses no motion
         anew = apart(prepared)
         while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
             found = found_in(shorter)
     return found
+
+
+LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
+
+
+def has_lost_its_way(prediction: Prediction) -> bool:
+    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
+    return prediction.error > LOST and is_smooth(prediction.residual, len(prediction.views))
+
+
+def running_on(comparison: Comparison) -> Comparison:
+    """The comparison along motions that run on for as long as its model follows them.
+
+    That is how the model is compared by itself: what its predecessor lost is no reason to begin anew.
+    """
+    for longer in _longer(comparison.prepared):
+        try:
+            whole = compare(comparison.model, longer)
+        except StudyError:
+            continue
+        if not has_lost_its_way(whole.prediction):
+            return whole
+    return comparison
+
+
+def _longer(prepared: Prepared) -> list[Prepared]:
+    """The same record with motions that run on for longer, the longest first."""
+    longer = prepared.running_on
+    return [] if longer is None else [*_longer(longer), longer]

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from study.compare.running_on import has_lost_its_way
 from study.diagnose.adding import added
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.records.excitation import displacement_noise
 from study.records.record import Record
-from study.way_in.compare_records import compare_records
+from study.way_in.compare_records import compare_records, has_lost_its_way
 
 
 @pytest.fixture(scope="module")

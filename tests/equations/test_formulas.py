@@ -142,7 +142,7 @@ def test_any_text_is_a_formula_or_an_expression_error(text: str) -> None:
     except ExpressionError:
         return
     assert all(np.isfinite(value) for value in graph.values)
-    assert formulas.names(text) == sorted(set(formulas.names(text)))
+    assert list(formulas.names(text)) == sorted(set(formulas.names(text)))
 
 
 def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
@@ -154,7 +154,7 @@ def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
 
 
 def test_names_lists_variables_not_functions() -> None:
-    assert formulas.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]
+    assert formulas.names("u*abs(v) + max(w, u_g)*pi") == ("u", "u_g", "v", "w")
 
 
 def test_formulas_are_read_in_many_threads_while_others_collect_garbage():

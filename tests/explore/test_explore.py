@@ -18,12 +18,11 @@ from study.diagnose.confirmed_faults import Diagnosed
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import decimate, page_units, saved_files, words
+from study.explore import decimate, page_units, words
 from study.explore import session as sessions
 from study.explore.axis_scales import log_ticks
 from study.explore.desk import Desk
-from study.explore.saved import saved
-from study.explore.saved_files import PAGE, files
+from study.explore.saved import PAGE, files, of_stage, saved
 from study.explore.view import View, history_columns
 from study.records.prepared import prepare_record
 from study.support.errors import StudyError
@@ -384,8 +383,8 @@ def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monke
         return {"response.png": b"drawn"}
 
     for name in ("history_pictures", "diagnosis_files"):
-        monkeypatch.setattr(saved_files, name, lambda *_: {})
-    monkeypatch.setattr(saved_files, "comparison_pictures", pictures)
+        monkeypatch.setattr(f"study.explore.saved.{name}", lambda *_: {})
+    monkeypatch.setattr("study.explore.saved.comparison_pictures", pictures)
     text = model_file.format_model(asked.stages[0].model)
     desk, done = Desk(asked, tmp_path / "rig.yaml", text, tmp_path / "out"), threading.Event()
     desk.diagnose()  # known: nothing is asked again, but it is drawn
@@ -397,7 +396,7 @@ def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monke
     desk.close()
     assert drawn == [asked.now.comparison]
     assert (tmp_path / "out" / "response.png").read_bytes() == b"drawn"
-    assert files(asked, "rig.yaml", text, drawn=saved_files.of_stage(asked.now)) == files(asked, "rig.yaml", text)
+    assert files(asked, "rig.yaml", text, drawn=of_stage(asked.now)) == files(asked, "rig.yaml", text)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,7 @@ from study.equations import model_file
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.live import Watcher
-from study.explore.saved import saved
-from study.explore.saved_files import PAGE, files
+from study.explore.saved import PAGE, files, saved
 from study.explore.view import View
 from study.faults.accounting import Accounted
 from study.faults.fault import NOTHING_ASKED, FaultSettings

@@ -18,12 +18,12 @@ from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
-from study.explore import decimate, saved_files
+from study.explore import decimate
 from study.explore import session as sessions
-from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
 from study.explore.live import Watcher
-from study.explore.saved import saved
+from study.explore.saved import files, saved
+from study.explore.session import Several, by_record, of_own
 from study.explore.view import View
 from study.records.excitation import Excitation, force
 from study.records.record import ALONE, MOTIONS, Record, Sensor
@@ -146,8 +146,8 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
         "history_pictures",
         "diagnosis_files",
     ):  # by tests of their own
-        monkeypatch.setattr(saved_files, drawn, lambda *_: {"response.png": b""})
-    contents = saved_files.files(grown, "rig.yaml", model_file.format_model(BELIEVED))
+        monkeypatch.setattr(f"study.explore.saved.{drawn}", lambda *_: {"response.png": b""})
+    contents = files(grown, "rig.yaml", model_file.format_model(BELIEVED))
     assert {"low_response.png", "high_response.png", "coefficients_by_level.csv"} <= set(contents)
     assert contents["comparison.csv"].decode().count("\n") == 1 + len(NAMES)
     text = contents["explore.html"].decode()
@@ -220,10 +220,10 @@ def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
     for drawn in ("comparison_pictures", "history_pictures"):
-        monkeypatch.setattr(saved_files, drawn, lambda *_: {})
+        monkeypatch.setattr(f"study.explore.saved.{drawn}", lambda *_: {})
     text = model_file.format_model(BELIEVED)
     for values in (True, False):
-        written = saved_files.files(session, "rig.yaml", text, values=values)["rig.yaml"].decode()
+        written = files(session, "rig.yaml", text, values=values)["rig.yaml"].decode()
         assert "k_high" not in written
         assert written.count("term: ") == (3 if values else 0)
     assert level.value[1] - level.value[0] == pytest.approx(together.comparison.fit.model.numbers()["k_high"], rel=1e-9)

@@ -195,7 +195,10 @@ def test_wrong_use_is_one_sentence(levels: list[st.Record], tmp_path: Path) -> N
         (lambda: st.compare(1), "1 is no fit"),
         (lambda: fit.across([record, "low.csv"]), "'low.csv' is no record"),
         (lambda: st.Model(modal=True), "modal=True is of a structure; expected coordinates"),
-        (lambda: st.Model.load(tmp_path / "pair.yaml").fit(levels), "is a sum of modes, which are found in one long"),
+        (
+            lambda: st.Model.load(tmp_path / "pair.yaml").fit(record, judge="every-other-block"),
+            "is a sum of modes, which are found in long stretches",
+        ),
     ]  # fmt: skip
     for use, sentence in cases:
         with pytest.raises(st.StudyError) as caught:

@@ -139,11 +139,16 @@ def test_the_response_that_is_asked_for_is_compared():
     np.testing.assert_array_equal(chosen.measured[:, 0], record["b displacement"])
 
 
-def test_what_a_measured_linear_part_cannot_use_is_refused():
-    record = of_two(force(RANDOM, SAMPLES, DT, 1))
-    for layout in (Layout(alternate=True), Layout(use=((1.0, 90.0),))):
-        with pytest.raises(StudyError, match=r"sum of modes.*one long stretch; expected --fit A:B"):
-            laid_out([record], layout, KindOfTest(unbroken=True))
+def test_modes_are_fitted_to_the_first_half_of_each_stretch_and_blocks_are_refused():
+    records = [of_two(force(RANDOM, samples, DT, 1)) for samples in (SAMPLES, SAMPLES // 2)]
+    prepared = laid_out(records, Layout(as_sampled=True), KindOfTest(unbroken=True))
+    assert len(prepared.record.stretches) == 4
+    (fit_begin, split), (judge_begin, end) = prepared.plan.fit, prepared.plan.judge
+    assert (fit_begin, split) == (0, judge_begin)
+    assert split == pytest.approx(end / 2, abs=2)
+    assert "of each of 2 stretches the first half is fitted" in " ".join(prepared.notes)
+    with pytest.raises(StudyError, match=r"sum of modes.*long stretches; expected --fit A:B"):
+        laid_out(records[:1], Layout(alternate=True), KindOfTest(unbroken=True))
 
 
 def test_a_decay_of_a_single_mass_may_be_judged_in_parts_that_are_named():

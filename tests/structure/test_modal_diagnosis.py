@@ -10,6 +10,7 @@ import pytest
 import study as st
 from study.cli import main
 from study.compare.comparison import compare
+from study.compare.each_record import levels_by_record, separated
 from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.verdict import diagnose
 from study.equations.linear_part import connections
@@ -21,6 +22,7 @@ from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
 from study.records.record import Sensor, write_csv
+from study.way_in.compare_records import compare_records
 
 ROOT = Path(__file__).parents[2]
 DT, SAMPLES = 0.005, 4000
@@ -75,6 +77,29 @@ def test_nothing_is_missing_from_the_right_model(record):
     diagnosis = diagnose(compare(model, prepare_record(record)), without=asked)
     assert diagnosis.verdict == "nothing_missing"
     assert "Nothing is missing" in diagnosis_in_words(diagnosis)
+
+
+@pytest.mark.long
+def test_one_set_of_modes_is_fitted_to_records_of_several_levels(record):
+    """Both records tell of the same modes and the same spring: together better than the louder one alone."""
+    text = BARE.replace("[]", "\n  - {term: cubic_stiffness, between: [ground, p10]}")
+    model, beam = parse_model(text, Path("right.yaml")), read_model(ROOT / "models" / "structures" / "beam.yaml")
+    drive = force(Excitation(level=0.5, reading="filtered", cutoff=30.0), SAMPLES, DT, 7)
+    exact, rng = simulate(beam, {"shaker": drive}, DT, Integrator("rk4", 4)), np.random.default_rng(8)
+    noisy = {s: exact[s] + 0.1 * np.std(exact[s]) * rng.standard_normal(SAMPLES) for s in record.sensors}
+    quiet = replace(exact.with_motions(noisy), name="quiet")
+    alone, both = (compare_records(records, model).comparison for records in ([record], [record, quiet]))
+    found = {c.key: c for c in both.coefficients}["k3[ground-p10]"]
+    assert found.interval[0] < 1e5 < found.interval[1]
+    assert both.fit.model.modal.count == alone.fit.model.modal.count
+    assert both.prediction.error == pytest.approx(both.prediction.floor, rel=0.05)
+    errors = [{c.key: c.error for c in one.coefficients}["k3[ground-p10]"] for one in (both, alone)]
+    assert errors[0] < errors[1]
+    model, marked, separate = separated(model, [record, quiet], ["cubic_stiffness"])
+    apart = compare_records(marked, model).comparison
+    (level,) = levels_by_record(apart, separate, [record, quiet])
+    assert not level.moves
+    assert level.value == pytest.approx([1e5, 1e5], rel=0.05)
 
 
 def test_candidates_are_nonlinear_effects_between_sensors():

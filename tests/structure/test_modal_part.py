@@ -23,7 +23,7 @@ from study.equations.simulate import Integrator, simulate
 from study.explore import session as sessions
 from study.explore.view import View
 from study.faults.accounting import Accounted
-from study.identify.frequency_domain.subspace import observability
+from study.identify.frequency_domain.modal_lines import observability
 from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
@@ -322,10 +322,10 @@ def test_the_page_of_a_modal_model_has_its_places_and_modes_and_no_error_of_the_
     assert not shown.stiffnesses
 
 
-def test_coefficients_by_record_are_not_asked_beside_modes():
+def test_of_modes_no_number_may_differ_between_records():
     text = "name: sheet\ncoordinates: [a]\nforces: {shaker: a}\nlinear: modal\nterms: []\n"
     records = [
         record_of(0.01, {"shaker": np.ones(64)}, {Sensor("a", "displacement"): np.ones(64)}, name=n) for n in "xy"
     ]
-    with pytest.raises(StudyError, match="a sum of modes, which are those of one record"):
+    with pytest.raises(StudyError, match="no such term or coefficient"):
         separated(parse_model(text, Path("sheet.yaml")), records, ["linear_stiffness"])

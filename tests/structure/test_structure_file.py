@@ -52,7 +52,7 @@ def test_a_term_is_added_at_its_place(tmp_path):
         (HEAD + MASSES + SPRING + SPRING.replace("[a, b]", "[b, a]"), "twice"),
         (HEAD + MASSES + "  - {term: linear_stiffness, at: a}\n", "nothing ties the coordinate 'b'"),
         (HEAD + MASSES.splitlines()[0] + "\n" + SPRING, "'b' has no inertia"),
-        (HEAD + SPRING, "for a component test a model without 'coordinates'"),
+        (HEAD.replace("forces: {shaker: a}\n", "") + SPRING, "for a component test, whose motion"),
         (HEAD + MASSES + "  - {term: linear_stiffness, couples: [a, b]}\n", "couples nothing"),
         (HEAD.replace("shaker: a", "shaker: c") + MASSES + SPRING, "no coordinate of the model"),
         (HEAD.replace("[a, b]", "[a, ground]") + MASSES + SPRING, "never moves"),

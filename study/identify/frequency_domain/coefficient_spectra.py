@@ -96,9 +96,11 @@ def coefficient_spectra(fit: FreeRunFit, prepared: Prepared) -> tuple[Coefficien
         seen, free = (_relative(prepared, model, e, motion) for motion in (measured, clean))
         instrument += [input_history(item, free) for item in inputs]
         corrected += instruments.inputs_without_noise(inputs, seen, free)
-    cut = Segments(segment_length(last - first, held=6, fewest=16, most=2048))
+    runs = prepared.record.runs((first, last))
+    cut = Segments(segment_length(min(b - a for a, b in runs), held=6, fewest=16, most=2048))
+    begins = [a - first for a, _ in runs[1:]]
     by_sensor = {
-        sensor.coordinate: _responses(sensor, [*instrument, *corrected, y[first:last]], prepared.dt, cut)
+        sensor.coordinate: _responses(sensor, [*instrument, *corrected, y[first:last]], prepared.dt, cut, begins)
         for sensor, y in zip(prepared.sensors, prepared.measured.T, strict=True)
     }
     at = next(k for k, (_, where) in enumerate(model.forces) if where in by_sensor)
@@ -135,9 +137,11 @@ def _relative(
     return prepared.record.relative(total, prepared.plan.fit)
 
 
-def _responses(sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segments) -> Responses:
-    """Displacement at a sensor by every input."""
-    matrix = spectra.cross_spectra([x - np.mean(x) for x in channels], dt, cut)
+def _responses(
+    sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segments, begins: Sequence[int]
+) -> Responses:  # fmt: skip
+    """Displacement at a sensor by every input; stretches after the first begin at ``begins``."""
+    matrix = spectra.cross_spectra_within([x - np.mean(x) for x in channels], begins, dt, cut)
     found = instruments.instrumental_responses(matrix)
     order = (2j * np.pi * np.maximum(found.frequency, found.frequency[1])) ** MOTIONS.index(sensor.motion)
     size = np.abs(order)[:, None, None] ** 2

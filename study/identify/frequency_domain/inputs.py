@@ -7,12 +7,13 @@ such a system; its inputs are shapes of the relative motions at the places of it
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from study.equations import formulas
-from study.equations.graph import Graph
+from study.equations.graph import Graph, Program
 from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE, HERE, Place
 from study.records.interpolation import between_samples
@@ -159,9 +160,7 @@ def input_history(item: Input, record: Record) -> Floats:
         bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([input_history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is None:
-        graph = Graph()
-        known = {name: graph.input(name) for name in (*wanted, *own)}
-        program = graph.program([formulas.add_formula(graph, formula, known)]).with_inputs(dict(item.parameters))
+        program = _program(formula, (*wanted, *own)).with_inputs(dict(item.parameters))
         return _finite(kernels.evaluate(program, data, len(record))[:, 0], item, record)
     memory = memory_program(formula, dict(item.parameters), [name for name in wanted if name != "t"])
 
@@ -174,6 +173,14 @@ def input_history(item: Input, record: Record) -> Floats:
         return out[:, 0, 0]
 
     return _finite(_settled(integrated), item, record)
+
+
+@lru_cache
+def _program(formula: str, given: tuple[str, ...]) -> Program:
+    """What computes a formula from inputs of these names."""
+    graph = Graph()
+    known = {name: graph.input(name) for name in given}
+    return graph.program([formulas.add_formula(graph, formula, known)])
 
 
 def _settled(integrated: Callable[[int], Floats]) -> Floats:

@@ -5,7 +5,7 @@ Systems and Signal Processing 14, 2000). Poles come from a subspace, amplitudes 
 to the smallest error of the lines.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,13 +14,69 @@ from scipy.fft import rfft
 from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
-from study.identify.frequency_domain.subspace import observability
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
-from study.support.arrays import Complexes, Floats
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import Point, minimise, point_at
+
+
+@dataclass(frozen=True, eq=False)
+class Observability:
+    """What the lines say of a system's order: a subspace and its weights."""
+
+    basis: Floats  # left singular vectors, shape (blocks outputs, blocks outputs)
+    singular: Floats  # how much of the outputs each direction holds, shape (blocks outputs,)
+    outputs: int  # how many
+    period: float  # T of the bilinear transformation ``s = 2/T (z - 1)/(z + 1)``, in seconds
+
+    def poles(self, order: int) -> Complexes:
+        """Eigenvalues in rad/s of the system of this order, reflected to the left where they are unstable."""
+        left = self.basis[:, :order]
+        shifted = np.linalg.lstsq(left[: -self.outputs], left[self.outputs :], rcond=None)[0]
+        z = np.asarray(np.linalg.eigvals(shifted), dtype=np.complex128)
+        s = 2.0 / self.period * (z - 1.0) / (z + 1.0)
+        return np.asarray(-np.abs(s.real) + 1j * s.imag, dtype=np.complex128)
+
+
+def observability(omega: Floats, inputs: Complexes, outputs: Complexes, blocks: int, stretch: Ints) -> Observability:
+    """The extended observability matrix's column space.
+
+    Parameters
+    ----------
+    omega : array, shape (lines,)
+        Angular frequency in rad/s.
+    inputs, outputs : complex array, shape (lines, inputs) and (lines, outputs)
+        Spectra; each output is scaled to unit power.
+    blocks : int
+        Block rows: more than the order of the system.
+    stretch : int array, shape (lines,)
+        Of which stretch each line is: one that is cut has a transient of its own.
+    """
+    period = 2.0 / float(np.sqrt(np.min(omega) * np.max(omega)))
+    turn = np.exp(2j * np.arctan(omega * period / 2.0))
+    transient = (stretch[:, None] == np.unique(stretch)) * np.sqrt(np.mean(np.abs(inputs[:, :1]) ** 2))
+    driven = _unit(np.concatenate([inputs, transient * turn[:, None]], axis=1))
+    rows = [_stack(driven, turn, blocks), _stack(_unit(outputs), turn, blocks)]
+    data = np.concatenate(rows)
+    real = np.concatenate([data.real, data.imag], axis=1)
+    triangle = np.asarray(np.linalg.qr(real.T)[1], dtype=np.float64).T
+    first = len(rows[0])
+    basis, singular, _ = np.linalg.svd(triangle[first:, first:])
+    return Observability(basis, singular, outputs.shape[1], period)
+
+
+def _unit(values: Complexes) -> Complexes:
+    size = np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    return values / np.where(size > 0.0, size, 1.0)
+
+
+def _stack(values: Complexes, turn: Complexes, blocks: int) -> Complexes:
+    """Block rows ``z^p values``, shape (blocks channels, lines)."""
+    powers: Sequence[Complexes] = [turn**p for p in range(blocks)]
+    return np.concatenate([(values * power[:, None]).T for power in powers])
+
 
 BLOCKS, MOST = 24, 8  # block rows of the subspace; modes at most
 SPARE = 4  # poles that may be real beside those of the modes: of the record's ends, and of what no mode is
@@ -45,6 +101,8 @@ class DrivenLines:
         Sensors in shares of their size, as displacements times ``order``.
     order : complex array, shape (lines, sensors)
         ``s^r / size`` of each sensor's motion.
+    stretch : int array, shape (lines,)
+        Of which stretch each is.
     """
 
     s: Complexes
@@ -52,41 +110,45 @@ class DrivenLines:
     unit: Complexes
     outputs: Complexes
     order: Complexes
+    stretch: Ints
 
 
 def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
-    """Lines of the fitting part, through a Hann window.
+    """Lines of the fitting part, through a Hann window; of several stretches those of each, one after the other.
 
     Raises
     ------
     StudyError
         If no force drives the structure, or a term's place has no sensor.
     """
-    first, last = prepared.plan.fit
-    taper = np.hanning(last - first + 1)[:-1]
-    names = [name for name, _ in model.forces]
-    lines = (last - first) // 2
-    omega = 2.0 * np.pi * np.arange(1, lines) / ((last - first) * prepared.dt)
-
-    def spectrum(values: Floats) -> Complexes:
-        part = values[first:last]
-        return np.asarray(rfft((part - np.mean(part)) * taper)[1:lines], dtype=np.complex128)
-
-    forces = np.stack([spectrum(prepared.record[n]) for n in names], axis=1)
-    power = np.sum(np.abs(forces) ** 2, axis=1)
-    smooth = np.convolve(power, np.ones(9) / 9.0, "same")
-    driven = np.flatnonzero(smooth > FAINT * float(np.max(smooth)))
-    expect(len(driven) > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {len(driven)} lines; expected more")
-    keep = driven[:: max(1, len(driven) // LINES)]
     blind = [c for t in model.terms for c in t.place.moving if c not in prepared.coordinates]
     expect(not blind, f"no sensor is at {', '.join(blind)}; expected terms of a modal model between sensors")
     motion = np.stack([prepared.record.motion(c) for c in model.coordinates], axis=2)
-    unit = [spectrum(x)[keep] for x in unit_forces(model, prepared.record, motion)]
-    s = (1j * omega[keep]).astype(np.complex128)
+    forces = prepared.record.columns([name for name, _ in model.forces])
+    unit = np.array(unit_forces(model, prepared.record, motion)).reshape(-1, len(forces)).T
+    channels = np.hstack([forces, unit, prepared.measured])
+    ends = forces.shape[1], forces.shape[1] + unit.shape[1]
+    spectra, frequency = list[Complexes](), list[Floats]()
+    for first, last in prepared.record.runs(prepared.plan.fit):
+        n, part = last - first, channels[first:last]
+        taper = np.hanning(n + 1)[:-1, None]
+        spectra.append(np.asarray(rfft((part - np.mean(part, axis=0)) * taper, axis=0)[1 : n // 2], np.complex128))
+        frequency.append(np.arange(1, n // 2) / (n * prepared.dt))
+    powers = [np.sum(np.abs(lines[:, : ends[0]]) ** 2, axis=1) / len(lines) for lines in spectra]
+    smooth = [np.convolve(power, np.ones(9) / 9.0, "same") for power in powers]
+    strongest = max(float(np.max(power)) for power in smooth)
+    driven = [np.flatnonzero(power > FAINT * strongest) for power in smooth]
+    count = sum(map(len, driven))
+    expect(count > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {count} lines; expected more")
+    kept = [lines[:: max(1, count // LINES)] for lines in driven]
+    found = np.concatenate([lines[keep] for lines, keep in zip(spectra, kept, strict=True)])
+    s = 2j * np.pi * np.concatenate([f[keep] for f, keep in zip(frequency, kept, strict=True)])
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
-    outputs = np.stack([spectrum(x)[keep] for x in prepared.measured.T], axis=1) / prepared.scale
-    columns = np.stack(unit, axis=1) if unit else np.zeros((len(keep), 0), dtype=np.complex128)
-    return DrivenLines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
+    shown = found[:, ends[1] :] / prepared.scale
+    return DrivenLines(
+        s.astype(np.complex128), found[:, : ends[0]], found[:, ends[0] : ends[1]], shown.astype(np.complex128),
+        order.astype(np.complex128), np.repeat(np.arange(len(kept)), [len(keep) for keep in kept]),
+    )  # fmt: skip
 
 
 def unit_forces(model: Model, record: Record, motion: Floats) -> list[Floats]:
@@ -204,7 +266,8 @@ def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[Li
     at = np.array([[float(c == s) for s in sensors] for c in points])
     drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
     inputs = np.concatenate([lines.forces, lines.unit], axis=1)
-    space = observability(lines.s.imag, inputs, lines.outputs / lines.order * np.abs(lines.order), BLOCKS)
+    shown = lines.outputs / lines.order * np.abs(lines.order)
+    space = observability(lines.s.imag, inputs, shown, BLOCKS, lines.stretch)
     power = float(np.sum(np.abs(lines.outputs) ** 2))
     for modes in range(1, most + 1):
         modal = ModalPart(points).of(modes)

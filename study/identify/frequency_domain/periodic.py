@@ -34,7 +34,6 @@ Chosen = tuple[int, ...]
 MOST = 12  # periods that are treated one by one; of more, neighbours are averaged first
 NEIGHBOURS = 10  # lines on either side that a variance is averaged over: its own line would correlate with the weight
 PASSES = 4  # weights from the coefficients before
-DIFFERENT = 0.5  # share of a force's power that may differ between periods
 
 
 def steady(record: Record, settle: int) -> Record:
@@ -55,7 +54,7 @@ def steady(record: Record, settle: int) -> Record:
     size = float(np.mean((force - np.mean(force)) ** 2))
     between = float(np.mean((force - mean) ** 2)) * count / (count - 1.0)
     share = between / size if size > 0.0 else 0.0
-    if share > DIFFERENT:
+    if share > 0.5:  # share of a force's power that may differ between periods
         raise StudyError(
             f"{100.0 * min(share, 1.0):.0f} % of the force of {record.name} differs between periods of {period} "
             "samples; errors_in_variables needs the same excitation in each"

@@ -20,7 +20,7 @@ from study.identify.frequency_domain.inputs import INERTIA, Input, along, histor
 from study.identify.frequency_domain.local_polynomial import Lines, transform
 from study.records import spectra
 from study.records.prepared import Prepared
-from study.records.record import Record
+from study.records.record import FORCE, Record, Sensor
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
@@ -97,9 +97,9 @@ def equations_of(
     for coordinate in model.coordinates:
         inputs = reverse_inputs(model, coordinate)
         needed = [c for c, *weights in _columns(model, inputs) if any(weights) or c == coordinate]
-        blind = [c for c in needed if c not in prepared.coordinates]
+        blind = [c for c in needed if c not in prepared.coordinates and (c == coordinate or not model.prescribed)]
         if blind:
-            lacking[coordinate] = f"no sensor is at {', '.join(blind)}"
+            lacking[coordinate] = f"no {'force' if model.prescribed else 'sensor'} is at {', '.join(blind)}"
         else:
             own.append(_equation(model, prepared, coordinate, inputs, span, cache))
     if not own:
@@ -118,8 +118,10 @@ def _equation(
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
     own = acting(model)[model.coordinates.index(coordinate)]
-    pairs = zip(own, model.forces, strict=True)
-    drives = [unit * record[name] for unit, (name, _) in pairs if unit != 0.0 and np.any(record[name])]
+    forces = [(unit, name) for unit, (name, _) in zip(own, model.forces, strict=True)]
+    if model.prescribed:
+        forces = [(1.0, str(Sensor(coordinate, FORCE)))]
+    drives = [unit * record[name] for unit, name in forces if unit != 0.0 and np.any(record[name])]
     output = np.sum(drives, axis=0) if drives else -prepared.record.motion(coordinate)[INERTIA]
     if not drives:
         mass = next(

@@ -20,7 +20,6 @@ from study.identify.frequency_domain.inputs import histories, reverse_inputs, wi
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.free_decay import free_decay_start
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
-from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, cross_spectra, cross_spectra_within, segment_length
@@ -31,7 +30,6 @@ from study.support.least_squares import least_squares, normal_inverse
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
 FEWEST_LINES = 4  # two more than mass, damping and stiffness need
-MAIN_LOBE = 5  # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
 SHORT = 512  # samples below which coherence may be missing because the record is short
 CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
 PADDED = 4  # times as many lines as samples show, for the peak of a short decay
@@ -50,7 +48,8 @@ class LinearApproximation:
     @property
     def single(self) -> bool:
         """Whether the lines are as few and as near as those that a Hann window makes of one frequency."""
-        return self.neighbours <= MAIN_LOBE
+        # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
+        return self.neighbours <= 5
 
     def around(self, frequency: float) -> "LinearApproximation":
         """The lines within half an octave of a frequency in hertz."""
@@ -153,15 +152,15 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     if is_alone(model):
         alone = linear_start(model_alone(model), prepared_alone(prepared))
         return dict(zip(model.values, alone.values(), strict=True))
+    if prepared.response == FORCE:
+        linear = [key for key in linear_keys(model) if key in model.values]
+        known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))  # others count as zero
+        return dict.fromkeys(model.values, 0.0) | along_the_motion(known, prepared, linear)
     if model.named:
         given = {key: value for key, value in model.values.items() if value is not None}
         start = free_decay_start if prepared.free else lumped_start
         known = {key: given[key] for key in linear_keys(model) if key in given}
         return dict.fromkeys(model.values, 0.0) | known | start(model, prepared, given)
-    if prepared.response == FORCE:
-        linear = [key for key in LINEAR_ORDERS if key in model.values]
-        known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))  # others count as zero
-        return dict.fromkeys(model.values, 0.0) | along_the_motion(known, prepared, linear)
     if prepared.free:
         return decay_start(model, prepared)
     if prepared.record.joints and "k" not in model.values:
@@ -196,8 +195,9 @@ def oscillator(prepared: Prepared) -> dict[str, float]:
 def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Coefficients by reverse MI/SO on the fitting part; those of the model are ignored, its shape parameters used."""
     if prepared.response == FORCE:
-        _ = reverse_inputs(model)  # refuses shape parameters that are not known
-        return along_the_motion(model, prepared, [s for t in model.terms for s in t.term.symbols])
+        for coordinate in model.coordinates:
+            _ = reverse_inputs(model, coordinate)  # refuses shape parameters that are not known
+        return along_the_motion(model, prepared, [s for t in model.terms for s in t.symbols])
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     inputs = reverse_inputs(model)
     if prepared.free:  # the inertia force takes the place of the measured one
@@ -281,15 +281,15 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
 
     Shape parameters keep the model's values.
     """
-    symbols = [s for t in model.terms for s in t.term.symbols]
+    symbols, outputs = [s for t in model.terms for s in t.symbols], prepared.outputs
     begun = model.with_values(dict.fromkeys(symbols, 0.0))
-    steps = needed_steps(begun, prepared.record, alone(FORCE))
+    steps = needed_steps(begun, prepared.record, outputs)
     run = prepare(
-        begun, prepared.record, symbols, sensors=alone(FORCE).sensors, span=prepared.plan.fit,
-        steps_per_sample=max(steps, 2),
-    )  # fmt: skip
+        begun, prepared.record, symbols, sensors=outputs.sensors, span=prepared.plan.fit, steps_per_sample=max(steps, 2)
+    )
     zeros = np.zeros((len(run.cuts) + 1, run.states))
-    shapes = prepared.known(run.respond(dict.fromkeys(symbols, 0.0), zeros)[1][:, 0], prepared.plan.fit)
+    shapes = outputs.stacked(run.respond(dict.fromkeys(symbols, 0.0), zeros)[1])
+    shapes = prepared.known(shapes, prepared.plan.fit)
     columns = [symbols.index(s) for s in wanted]
     if not np.all(np.isfinite(shapes)):
         raise StudyError(f"the forces of {model.name!r} are no numbers all along {prepared.record.name!r}")

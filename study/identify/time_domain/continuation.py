@@ -13,7 +13,6 @@ from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError
 from study.support.levenberg_marquardt import OFFSET
 
-DOUBLINGS = 5  # from segments of one period to segments of 32: a longer chaotic motion has too many local minima
 TRIALS = 6  # free runs for each set of segments
 NEAR = 0.01  # standard errors: how near a minimum an intermediate fit has to come
 RARE = 1e-3  # probability that two segments of one motion are kept apart
@@ -40,7 +39,8 @@ def lengthen(fit: FreeRunFit, segments: ShootingSegments, held: Collection[str])
     last fit are where the motion could not be made continuous.
     """
     fits = [fit]
-    for _ in range(DOUBLINGS):
+    # from segments of one period to segments of 32: a longer chaotic motion has too many local minima
+    for _ in range(5):
         try:
             fits.append(_merged(fits[-1], segments, held))
         except DivergenceError:  # a wrong model may stay finite over short segments alone

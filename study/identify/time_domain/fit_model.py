@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.equations.equations_of_motion import loose_motions
 from study.equations.model import Model, ModelTerm
 from study.equations.redundancy import repeated_along
 from study.equations.terms import LIBRARY
@@ -21,7 +22,7 @@ from study.identify.frequency_domain.start_of_changes import start_of_changes
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.modal_fit import with_modal_term
+from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.no_response import (
     LINEAR,
@@ -35,7 +36,7 @@ from study.identify.time_domain.no_response import (
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, rough_steps
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline, Start
-from study.identify.time_domain.structure_start import first_fit
+from study.identify.time_domain.shooting import own_begins
 from study.identify.time_domain.told_alone import (
     entry_alone,
     fit_alone,
@@ -46,13 +47,12 @@ from study.identify.time_domain.told_alone import (
 )
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
-from study.support.errors import StudyError, expect
+from study.support.errors import DivergenceError, StudyError, expect
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
 BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
-ASIDE = 1.2  # times the mass of a fit, where another begins that is to come back
 SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
 BESIDE = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
@@ -102,7 +102,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     short = unknown and not (model.named or changes)  # a short stretch tells of no change along a long one
     look = shape_search.searched_stretch(known, prepared) if short else prepared
-    fit = first_fit(known, look) if model.named else _from_nothing(known, look)
+    placed = model.named and prepared.response != FORCE
+    fit = first_fit(known, look) if placed else _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)
     in_order = tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms)
@@ -134,7 +135,8 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     The steady motion has the same error for any mass and the stiffness to it; what little is left (rounding, a force
     between its samples) chooses one of them, with a standard error that means nothing.
     """
-    heavier = _along_steady(fit.model.numbers(), omega, ASIDE)
+    # another fit begins a fifth heavier, and is to come back
+    heavier = _along_steady(fit.model.numbers(), omega, 1.2)
     again = _tried(fit.model.with_values(heavier), prepared, fit.held, heavier, KEPT)
     if fit.restarts or again is None or not (fit.converged and again.converged):
         return False
@@ -215,7 +217,8 @@ def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) ->
     if fit.model.modal:
         return _beside_modes(base, entry, points)
     grown, points = fit.model.with_term(entry), points or shape_search.shape_starts(entry, base)
-    starts = (_from_the_equations if base.several else _from_the_free_run)(entry, base, points)
+    in_reverse = base.several and not base.prescribed
+    starts = (_from_the_equations if in_reverse else _from_the_free_run)(entry, base, points)
     initial = grown_states(fit, grown) if base.several else None  # which no sensor may show
     try:
         best = best_fit(grown, prepared, [start | given for start in starts], (*fit.held, *given), initial)
@@ -387,3 +390,52 @@ def _check_own_formulas(model: Model, prepared: Prepared) -> None:
     along = {name: motion[channel] for name, channel in channels.items()} | {"t": motion.time}
     fault = repeated_along(model, along, prepared.record.name)
     expect(fault is None, f"{fault}")
+
+
+def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
+    """Fit all that a structure leaves open; what it gives is held.
+
+    From the linear terms alone, and where that diverges or stays far from the motion, with more damping.
+
+    Raises
+    ------
+    StudyError
+        If no fit begins.
+    """
+    if model.modal:
+        return modal_fit(model, prepared)
+    linear = linear_start(model, prepared)
+    start = {key: linear[key] for key, value in model.values.items() if value is None}
+    fits: list[FreeRunFit] = []
+    with suppress(DivergenceError):
+        fits.append(_begun(model, prepared, start))
+    if not fits or (not fits[0].converged and 2.0 * fits[0].rms ** 2 > prepared.spread**2):
+        calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
+        try:
+            fits.append(_begun(model, prepared, calm))
+        except DivergenceError:
+            expect(fits, _endless(model, prepared))
+    return min(fits, key=lambda fit: fit.rms)
+
+
+def _begun(model: Model, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit:
+    """A fit from one start; of a decay from rest where its own states let the motion escape from springs far wrong."""
+    steps = rough_steps(model, prepared, start)
+    try:
+        return fit_part(model, prepared, model.held_keys, start, steps=steps)
+    except DivergenceError:
+        if not prepared.record.stretches:
+            raise
+        states = 2 * len(model.coordinates) + len(model.states)
+        rest = np.zeros((1 + len(own_begins(prepared.record, prepared.plan.fit)), states))
+        return fit_part(model, prepared, model.held_keys, start, steps=steps, initial=rest)
+
+
+def _endless(model: Model, prepared: Prepared) -> str:
+    """Why no fit begins."""
+    said = f"{model.name!r} has no finite motion under the forces of {prepared.record.name!r}"
+    loose = loose_motions(model)
+    if not loose:
+        return said
+    tied = f"nothing ties it down in {loose} of its {len(model.coordinates)} motions, in which it drifts away"
+    return f"{said}: {tied}; expected a term between 'ground' and a coordinate, if the structure stands on something"

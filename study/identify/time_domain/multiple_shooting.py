@@ -22,12 +22,10 @@ from study.records.prepared import Prepared
 from study.records.record import Record
 from study.support.errors import DivergenceError
 
-ROUNDS = 2  # attempts at one continuous motion
 SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # continuity weights that lead coefficients near the truth, and free runs with each
 FIRM, FIRMLY = 30.0, 12  # continuity weight at which gaps are within the noise of the states, and free runs
 TIGHT, TIGHTLY = 100.0, 30  # continuity weight at which the segments are one motion, and free runs
 CLEAN = 0.01  # of the response's standard deviation: a residual to which long steps of the integrator may add
-DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
 
 
 def fit_in_segments(
@@ -97,7 +95,7 @@ def _continuous(
     """One motion if it is found, else the longest segments whose misfit is what that of the loose ones suggests."""
     best = loose
     try:
-        for rounds_left in reversed(range(ROUNDS)):
+        for rounds_left in reversed(range(2)):  # attempts at one continuous motion
             longer = lengthen(near, segments, held)
             good = (fit for fit in reversed(longer[1:]) if _as_good(fit, loose, np.size(fit.initial)))
             best = next(good, best)
@@ -136,4 +134,5 @@ def _as_good(fit: FreeRunFit, loose: FreeRunFit, kept: int = 0) -> bool:
     given_up = states - kept
     cost, before = (float(np.sum(f.residual**2)) for f in (fit, loose))
     variance = before / max(len(loose.residual) - len(loose.keys) - states, 1)
-    return cost - before < variance * (given_up + DEVIATIONS * np.sqrt(2.0 * given_up))
+    # the misfit may exceed what fewer unknowns explain by three standard deviations
+    return cost - before < variance * (given_up + 3.0 * np.sqrt(2.0 * given_up))

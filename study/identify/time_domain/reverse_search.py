@@ -44,10 +44,11 @@ class EquationsAlongMotion:
     paths: Complexes  # from a force on each coordinate to each sensor, on their lines; shape (lines, s, c)
 
     def record(self, place: Place, motion: Floats | None = None) -> Record:
-        """Relative motion at a place, with the time at which it was."""
-        fit, prepared = self.base.fit, self.base.prepared
-        own = relative_record(place, fit.model, self.motion if motion is None else motion, prepared.dt)
-        return replace(own, start=prepared.record.start + fit.first * prepared.dt)
+        """Relative motion at a place, with the time at which it was and the channels that formulas may name."""
+        fit, source = self.base.fit, self.base.prepared.record
+        own = relative_record(place, fit.model, self.motion if motion is None else motion, source.dt)
+        further = {name: source[name][slice(*fit.span)] for name in source.extra}
+        return replace(own, channels={**own.channels, **further}, start=source.start + fit.first * source.dt)
 
     def unit_forces(self, entry: ModelTerm, record: Record) -> list[Complexes]:
         """Lines of the force of each component with a unit coefficient along a motion."""

@@ -26,7 +26,6 @@ from study.identify.time_domain.part_fit import run_of, with_states
 from study.identify.time_domain.reverse_search import EquationsAlongMotion, equations_along_motion
 from study.identify.time_domain.told_alone import fit_alone, is_alone, prepared_alone
 from study.records.interpolation import between_samples
-from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
@@ -35,8 +34,6 @@ from study.support.least_squares import least_squares, length_or_one
 
 PERIODS = 100.0  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
-PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
-SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
 VARIED = "quantiles of what it varies with"
 STARTS = 4  # points of the search that start a fit
@@ -73,6 +70,11 @@ class Baseline:
         """Whether there are several coordinates, and with them places where an effect may sit, or modes."""
         return len(self.fit.model.coordinates) > 1 or self.fit.model.modal is not None
 
+    @property
+    def prescribed(self) -> bool:
+        """Whether the motion is prescribed, and forces are what is predicted."""
+        return self.prepared.response == FORCE
+
     def along(self, place: Place, order: int = 0) -> Floats:
         """Relative displacement, or a derivative of it, at a place, shape (n,)."""
         return self.motion[order] @ np.array(place.direction(self.fit.model.coordinates))
@@ -83,11 +85,12 @@ class Baseline:
         On the lines of a transform of so many samples; a constant goes through as the lowest line does.
         """
         model, sensors = self.fit.model, self.fit.outputs.sensors
+        omega = np.asarray(2j * np.pi * rfftfreq(size, self.prepared.dt), dtype=np.complex128)
+        if self.prescribed:  # nothing passes through a structure there
+            here = np.array([[float(s.coordinate == c) for c in model.coordinates] for s in sensors])
+            return np.broadcast_to(here.astype(np.complex128), (len(omega), *here.shape))
         if self.several:
             return transfer(model, sensors, self.prepared.dt, size)
-        omega = np.asarray(2j * np.pi * rfftfreq(size, self.prepared.dt), dtype=np.complex128)
-        if self.prepared.response == FORCE:  # nothing passes through a structure there
-            return np.ones((len(omega), 1, 1), dtype=np.complex128)
         omega[0] = omega[1]
         own, order = self.approximation, MOTIONS.index(self.prepared.response)
         found = omega**order / (own["m"] * omega**2 + own["c"] * omega + own["k"])
@@ -133,7 +136,7 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     motions = tuple(Sensor(c, m) for m in MOTIONS for c in fit.model.coordinates)
     free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
-    if len(fit.model.coordinates) > 1 or fit.model.modal:
+    if (len(fit.model.coordinates) > 1 or fit.model.modal) and prepared.response != FORCE:
         return Baseline(fit, prepared, basis, motion, {}, {})
     one = (fit_alone(fit), prepared_alone(prepared)) if is_alone(fit.model) else (fit, prepared)
     return Baseline(fit, prepared, basis, motion, *_linear(*one))
@@ -141,12 +144,12 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
 
 def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:
     """Best linear approximation in the model's terms, and as an oscillator; of a stretch at rest what the fit has."""
+    if prepared.response == FORCE:
+        return linear_start(fit.model, prepared), {}
     try:
         return linear_start(fit.model, prepared), oscillator(prepared)
     except StudyError:
         own = fit.model.numbers()
-        if prepared.response == FORCE:
-            return own, {}
         slowest = (2.0 * np.pi / (len(fit.residual) * prepared.dt)) ** 2
         approximation = {"m": own["m"], "c": own.get("c", 0.0), "k": own.get("k") or own["m"] * slowest}
         return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
@@ -155,12 +158,12 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
 def shape_starts(entry: ModelTerm, base: Baseline) -> list[Start]:
     """The best points of the search over a candidate's shape parameters, best first.
 
-    A single mass is asked by the sensitivities of its free run, one run a point. Where there are several places a free
-    run each is too much, and the reverse system is asked.
+    A single mass is asked by the sensitivities of its free run, one run a point, and so is a component, whose run costs
+    little. Where a structure has several places a free run each is too much, and the reverse system is asked.
     """
     if base.fit.model.modal:
         return _along_lines(entry, base)
-    if base.several:
+    if base.several and not base.prescribed:
         u = base.reverse.record(entry.place)["displacement"]
         found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
         return sorted((point for point in found if point is not None), key=lambda s: -s.share)
@@ -194,8 +197,8 @@ def sensitivity(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline)
     given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
     model = base.fit.model.with_term(given)
     steps = base.fit.steps_per_sample
-    if prepared.response == FORCE:  # a loop that closes sharply asks for more than any motion would
-        steps = max(steps, needed_steps(model, prepared.record, alone(FORCE)))
+    if base.prescribed:  # a loop that closes sharply asks for more than any motion would
+        steps = max(steps, needed_steps(model, prepared.record, prepared.outputs))
     try:
         run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, entry.symbols)
         _, added = run.respond(dict.fromkeys(entry.symbols, 0.0), base.fit.initial)
@@ -231,7 +234,8 @@ def points_to_try(entry: ModelTerm, u: Floats, base: Baseline) -> list[tuple[flo
         return np.add.outer(np.array(found), shifts).ravel() / (len(u) * base.prepared.dt)
 
     # a prescribed stroke may be many times the slip that closes a loop
-    sharp = SHARP if base.prepared.response == FORCE else ()
+    # per amplitude, of loops that close within a small part of a stroke
+    sharp = (15.0, 40.0, 100.0, 250.0) if base.prescribed else ()
     points: list[tuple[float, ...]] = [()]
     for parameter, given in zip(entry.term.parameters, entry.parameters, strict=True):
         points = [
@@ -301,7 +305,7 @@ def pitches(u: Floats, place: Place, base: Baseline, shifts: Floats) -> Floats:
     model that lacks the force is soon pitches away. At its rms velocity the motion takes one sample for a pitch at
     least.
     """
-    if not base.several and base.prepared.response != FORCE:
+    if not (base.several or base.prescribed):
         u = base.reverse.record(place)["displacement"]
     span, step = float(np.ptp(u)), float(np.sqrt(np.mean(np.diff(u) ** 2)))
     if not (np.isfinite(span) and 0.0 < step < span):
@@ -346,7 +350,8 @@ def highest_lines(spectrum: Floats) -> list[float]:
     height = np.log(np.maximum(spectrum, 1e-300)) - np.log(np.maximum(level, 1e-300))
     inner = np.arange(3, n - 1)
     peaks = inner[(height[inner] >= height[inner - 1]) & (height[inner] > height[inner + 1])]
-    best = peaks[np.argsort(-height[peaks])][:PEAKS]
+    # the highest are tried as the frequency of a periodic effect
+    best = peaks[np.argsort(-height[peaks])][:6]
     return [float(i) + _top(height[i - 1 : i + 2]) for i in best]
 
 

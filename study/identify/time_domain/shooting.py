@@ -67,11 +67,13 @@ def needed_restarts(
     kept: list[int] = []
     grown: list[Floats] = []  # from each restart that matters to where the present segment ends
     own = own_begins(record, span)
-    for begin, through in zip((span[0], *restarts[:-1]), weighted, strict=True):
+    alone = np.linalg.norm(weighted, 2, axis=(1, 2))  # of each segment: most are all that there is to look at
+    for begin, through, size in zip((span[0], *restarts[:-1]), weighted, alone.tolist(), strict=True):
         if begin in own:  # nothing from before reaches a motion that begins anew
             grown = []
-        grown = [through @ p for p in grown] + [through]
-        sizes = [float(np.linalg.norm(p, 2)) for p in grown]
+        grown = [through @ p for p in grown]
+        sizes = [*(float(np.linalg.norm(p, 2)) for p in grown), size]
+        grown.append(through)
         if max(sizes) > GROWTH and len(grown) > 1:
             kept.append(begin)
             grown, sizes = [through], sizes[-1:]

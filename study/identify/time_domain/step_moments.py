@@ -20,9 +20,7 @@ from study.support.errors import StudyError
 from study.support.least_squares import length_or_one
 from study.support.lowest import lowest
 
-ABOUT = 0.02  # of what is covered: as far to either side the moment is looked for first
 INSIDE = 3.84  # of chi squared with one degree of freedom: the 95 % interval
-PLACES = 9  # of what the fitted part leaves open, that are tried first
 
 
 def dated(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -31,10 +29,12 @@ def dated(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         return fit
     for key, variation in _moments(fit):
         now, (first, last) = fit.model.numbers()[key], _range(variation, prepared)
-        own, about, apart = _left(fit, prepared, key), ABOUT * (last - first), _apart(variation)
+        # the moment is looked for first as far to either side as a fiftieth of what is covered
+        own, about, apart = _left(fit, prepared, key), 0.02 * (last - first), _apart(variation)
         at = lowest(own, [now - about, now, now + about], apart)
         low, high = (at + side * _reach(own, at, side, apart, last - first) for side in (-1.0, 1.0))
-        begins = np.linspace(max(low, first), min(high, last), PLACES)
+        # what the fitted part leaves open is tried at nine moments first
+        begins = np.linspace(max(low, first), min(high, last), 9)
         at = lowest(_left(fit, prepared, key, judged=True), begins.tolist(), apart)
         try:
             again = fit_part(

@@ -33,7 +33,8 @@ def states_along(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int]) -> 
     plain = _held(fit, prepared, span, "estimate")
     outputs = prepared.outputs
     measured = outputs.stacked(outputs.measured(prepared.record, span))
-    if prepared.response == FORCE or not own_begins(prepared.record, span) or not is_poor(plain, measured):
+    drifts = fit.model.modal is None and prepared.response != FORCE  # of modes no sensor shows where segments begin
+    if not drifts or not own_begins(prepared.record, span) or not is_poor(plain, measured):
         return plain.initial
     segments = ShootingSegments(
         prepared.record, outputs, span, even_restarts(prepared.record, outputs, span), fit.steps_per_sample

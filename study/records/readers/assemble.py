@@ -18,9 +18,7 @@ from study.support.numbers import LAST_DIGITS
 from study.support.terminal import on_a_line
 from study.support.units import is_unit, parse_unit, role_unit
 
-LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
 T = TypeVar("T", str, float)
-AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
 def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) -> Record:
@@ -56,7 +54,8 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     simulated = path.stem == "record"  # as all are called that the simulator writes, each in a folder of its own
     name = path.resolve().parent.name if simulated else path.stem
     name = f"{name}_{options.group.strip('/').replace('/', '_')}" if options.group else name
-    name = on_a_line(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
+    # names of files have 255 bytes, and more is put to this one
+    name = on_a_line(name)[:120]  # files are named after it, and pictures show it
     record = Record(
         dt, channels | still, usual | named, name, start, period, coordinates=roles.coordinates, forces=roles.forces
     )
@@ -193,5 +192,6 @@ def _period(
     for force in forces:
         change, called = checks.change_after(channels[force], period), "force" if roles.alone else f"force {force!r}"
         differs = f"the {called} {period} samples later differs by {100.0 * change:.0f} % of its rms"
-        expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")
+        # after a period a random force changes by 1.4 of its rms
+        expect(change <= 0.7, f"{given}, and {differs}; expected the number of samples after which it repeats")
     return period

@@ -2,24 +2,24 @@
 
 How: among all pairs of delimiter and decimal mark, the one under which most lines of the file's head
 fall into the same number of cells, most of them numbers. What stands above the first line of numbers is
-the header; numbers are then read by the compiled parser of pandas.
+the header; numbers are then read by a compiled parser (:mod:`study.records.number_table`), and where that meets
+anything but a number, cell by cell.
 """
 
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from io import BytesIO
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from study.records.number_table import number_table
 from study.records.readers.table import NONE, Column, Table, split_unit
+from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
 from study.support.yaml_text import excerpt
@@ -31,7 +31,6 @@ DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANK
 COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 EXPECTED = "expected a table with one line for each sample"
-WORDS = re.compile(rb"true|false", re.IGNORECASE)  # the compiled parser takes these for 1 and 0
 NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
 
 
@@ -179,53 +178,67 @@ def _commented(lines: Sequence[str], best: _Reading) -> list[str]:
 def _table(path: Path, body: bytes, layout: TextLayout) -> Table:
     """Cells as numbers at once, or where one holds text, cell by cell: a column with text is refused if asked for."""
     place, width = partial(_line, body, layout.first), len(layout.names)
-    in_words = WORDS.search(body) is not None
-    try:
+    headings = list(zip(layout.names, layout.units, strict=True))
+    comment = "%" if b"\n%" in body else "#"
+    values = _numbers(body, layout, comment)
+    if values is None:
         try:
-            frame = _parse(body, layout, "str" if in_words else "float64")
-        except pd.errors.ParserError:  # cells too many, which the slow road would not mend
-            raise
-        except (ValueError, OverflowError):
-            in_words, frame = True, _parse(body, layout, "str")
-    except ValueError as error:
-        raise StudyError(f"{path}: {_ragged(str(error), layout, place(0))}") from None
-    hidden = f"{path}: line {layout.first + 1} has {frame.shape[1]} cells of numbers; expected {width}"
-    expect(frame.shape[1] == width, hidden)  # a comment behind the first sample can hide some of its cells
-    headings = enumerate(zip(layout.names, layout.units, strict=True))
-    if in_words:
-        return Table(tuple(_checked(n, u, frame[k], layout.decimal, place) for k, (n, u) in headings), place=place)
-    columns = (Column(n, frame[k].to_numpy(dtype=np.float64), u) for k, (n, u) in headings)
+            cells = list(zip_longest(*_rows(body, layout, comment), fillvalue=""))
+        except (csv.Error, ValueError) as error:
+            raise StudyError(f"{path}: {error}") from None
+        found = len(cells)
+    else:
+        cells, found = [], values.shape[1]
+    hidden = f"{path}: line {layout.first + 1} has {found} cells of numbers; expected {width}"
+    expect(found == width, hidden)  # a comment behind the first sample can hide some of its cells
+    if values is None:
+        columns = [_checked(*heading, cells[k], layout.decimal, place) for k, heading in enumerate(headings)]
+    else:
+        columns = [Column(n, np.ascontiguousarray(values[:, k]), u) for k, (n, u) in enumerate(headings)]
     # A delimiter at the end of each line leaves an unnamed column without a number.
-    return Table(tuple(c for c in columns if c.name or not bool(np.isnan(c.values).all())), place=place)
+    kept = tuple(c for c in columns if c.name or c.fault or not bool(np.isnan(c.values).all()))
+    return Table(kept, place=place)
 
 
-def _parse(body: bytes, layout: TextLayout, dtype: str) -> pd.DataFrame:
-    return pd.read_csv(
-        BytesIO(body), sep=layout.delimiter, decimal=layout.decimal, header=None, index_col=False, dtype=dtype,
-        comment="%" if b"\n%" in body else "#", skipinitialspace=True, engine="c",
-        keep_default_na=False, na_values=[""],
-    )  # fmt: skip
+def _numbers(body: bytes, layout: TextLayout, comment: str) -> Floats | None:
+    """Cells as numbers, shape (lines, cells); None where one is none, or lines differ in their cells."""
+    if not body.isascii() or (layout.decimal == "," and b"." in body):
+        return None
+    points = body.replace(b",", b".") if layout.decimal == "," else body
+    try:
+        return number_table(points, None if layout.delimiter == BLANKS else layout.delimiter, comment)
+    except ValueError:
+        return None
 
 
-def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place: Place) -> Column:
+def _rows(body: bytes, layout: TextLayout, comment: str) -> Iterator[list[str]]:
+    """Cells of each line that has some; a line with more of them than the first is refused (ValueError)."""
+    first, width = 0, len(layout.names)
+    blanks = " " if layout.delimiter == "\t" else SPACE
+    for k, line in enumerate(body.decode("utf-8", errors="replace").split("\n"), start=layout.first + 1):
+        text = line.partition(comment)[0].strip(blanks)
+        if not text:
+            continue
+        if text.count('"') % 2:
+            raise ValueError(f"line {k} has a quotation mark without another; expected two around a cell")
+        in_blanks = layout.delimiter == BLANKS
+        cells = [c.strip('"') for c in re.split(r"[ \t]+", text)] if in_blanks else _cells(text, layout.delimiter)
+        first = first or len(cells)
+        if len(cells) > first and first != width:  # the first line is the odd one
+            raise ValueError(f"{_line(body, layout.first, 0)} has {first} cells of numbers; expected {width}")
+        if len(cells) > first:
+            raise ValueError(f"line {k} has {len(cells)} cells; expected {width} as in the lines above")
+        yield cells
+
+
+def _checked(name: str, unit: str, cells: Sequence[str], decimal: str, place: Place) -> Column:
     """Each cell on its own; a column with text says where it stands if it is asked for."""
-    texts = [cell.strip(SPACE) if isinstance(cell, str) else "" for cell in cells.tolist()]
-    wrong = next((i for i, cell in enumerate(texts) if cell and not _is_number(cell, decimal)), None)
+    wrong = next((i for i, cell in enumerate(cells) if cell and not _is_number(cell, decimal)), None)
     if wrong is not None:
-        fault = f"column {name!r} holds {excerpt(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
+        fault = f"column {name!r} holds {excerpt(cells[wrong], 30)!r} in {place(wrong)}; expected a number"
         return Column(name, NONE, unit, fault=fault)
-    numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in texts)
+    numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in cells)
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
-
-
-def _ragged(error: str, layout: TextLayout, top: str) -> str:
-    width = len(layout.names)
-    numbers = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
-    if numbers is None:
-        return f"the table cannot be read; {EXPECTED}"
-    if int(numbers[1]) != width:  # the first line is the odd one
-        return f"{top} has {numbers[1]} cells of numbers; expected {width}"
-    return f"line {int(numbers[2]) + layout.first} has {numbers[3]} cells; expected {width} as in the lines above"
 
 
 def _line(body: bytes, first: int, index: int) -> str:
