@@ -29,7 +29,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         default=12.5,
         help="low-pass in Hz (default %(default)s)",
     )
-    parser.add_argument("--seed", type=whole_number(0, 2**63 - 1), default=1, help="the same seed gives the same record")
+    parser.add_argument(
+        "--seed", type=whole_number(0, 2**63 - 1), default=1, help="the same seed gives the same record"
+    )
     parser.add_argument("--samples", type=whole_number(16, 10_000_000), default=8192, help="default %(default)s")
     parser.add_argument(
         "--dt",
