@@ -18,7 +18,7 @@ from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.promised_changes import PromisedChanges
 from study.identify.time_domain.smoothness import with_curve
 from study.identify.time_domain.weighted_fit import finished
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import StudyError
 from study.support.thresholds import PROMISING, K
@@ -43,12 +43,18 @@ def suspect(changes: PromisedChanges, comparison: Comparison) -> Suspect | None:
     """The changes that are worth a fit; None where the model does not follow the record laid out so.
 
     With what something changes the sensitivities tell: with time, or which channel. Where it is much, the coefficient
-    that promises most need not be the one that changes, so all are fitted that promise anything with that.
+    that promises most need not be the one that changes, so all are fitted that promise anything with that. In a
+    component test, where directions may follow channels of their own, each channel that promises anything is asked.
     """
     prepared, fit = changes.prepared, comparison.fit
-    worth = [entry for entry, share in changes.shares.items() if share >= PROMISING * changes.most]
-    along = {entry.term.variation.along for entry in worth if entry.term.variation}
-    chosen = [entry for entry in changes.shares if entry.term.variation and entry.term.variation.along in along]
+    worth = {
+        e.term.variation.along
+        for e, share in changes.shares.items()
+        if e.term.variation and share >= PROMISING * changes.most
+    }
+    if prepared.response == FORCE:
+        worth |= {e.term.variation.along for e in changes.shares if e.term.variation} - {ALONG_TIME}
+    chosen = [e for e in changes.shares if e.term.variation and e.term.variation.along in worth]
     try:
         if prepared is not comparison.prepared:
             rough = fit_part(fit.model, prepared, fit.held, steps=rough_steps(fit.model, prepared, {}))

@@ -127,10 +127,11 @@ def rig_orders(first: int = 780_001, each: int = 26) -> list[Order]:
     return [Order("", first + i, None, None, None, test=kinds[i % len(kinds)]) for i in range(each * len(kinds))]
 
 
-def next_test_orders(count: int = 120, first: int = 640_001) -> list[Order]:
+def next_test_orders(count: int = 120, first: int = 640_001, settled: int = 13) -> list[Order]:
     """So many trials of tests whose ties are of equals, for a test that is to end them: a damper is hidden.
 
-    Where one effect is the limit of another, as a steady force of a soft contact, no test ends a tie.
+    Where one effect is the limit of another, as a steady force of a soft contact, no test ends a tie. The first ones,
+    on which it was settled how a promise is reckoned, prove nothing of it and are left out.
     """
     tests, dampers = ("base", "blows", "free_decay"), [name for name in HIDDEN if name.endswith("_damping")]
     noises = FAMILIES[tests[0]].noises[1:]
@@ -139,7 +140,7 @@ def next_test_orders(count: int = 120, first: int = 640_001) -> list[Order]:
             PLANNED, first + i, (dampers[(i // len(tests)) % len(dampers)],), noises[i % len(noises)], None,
             test=tests[i % len(tests)],
         )
-        for i in range(count)
+        for i in range(settled, count)
     ]  # fmt: skip
 
 

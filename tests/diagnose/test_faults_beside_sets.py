@@ -64,6 +64,7 @@ class Corrected:
         self.comparison = SimpleNamespace(model=Model("inertia"))
         self.asked: list[tuple[str, ...]] = []
         self.otherwise: list[tuple[Fault, ...]] = []  # for what it was corrected in its place
+        self.put_off = False
 
     def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
         self.asked.append(model.names)
@@ -86,7 +87,8 @@ def diagnosed(
         names, left, error = found[len(made)]
         made.append(names)
         answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
-        return SimpleNamespace(answer=answer, left=left, verdict=SEVERAL if names else UNKNOWN)
+        changes = any("_over_" in name for name in names)
+        return SimpleNamespace(answer=answer, left=left, verdict=SEVERAL if names else UNKNOWN, changes=changes)
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
@@ -182,3 +184,27 @@ def test_where_the_fuller_model_cannot_be_asked_the_first_diagnosis_stands(monke
     found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05))
     assert made == 1
     assert found.accounted is record
+
+
+class PutOff(Corrected):
+    """A record along which a coefficient seems to change: faults that look like that are yet to be looked for."""
+
+    def __init__(self, hidden: Sequence[Fault]):
+        super().__init__((), ())
+        self.put_off, self.hidden = True, hidden
+
+    def with_all_faults(self) -> Corrected:
+        return Corrected(self.hidden, self.hidden)
+
+
+def test_faults_that_look_like_a_change_are_looked_for_where_none_is_named(monkeypatch: pytest.MonkeyPatch):
+    late = delay(1.0)
+    found, made = diagnosed(monkeypatch, PutOff([late]), (ONE, 0.01, 0.05), (ONE, 0.0, 0.02))
+    assert made == 2
+    assert found.accounted.faults == (late,)
+
+
+def test_a_change_that_is_named_needs_no_fault_in_its_stead(monkeypatch: pytest.MonkeyPatch):
+    found, made = diagnosed(monkeypatch, PutOff([delay(1.0)]), (("linear_stiffness_over_time",), 0.0, 0.02))
+    assert made == 1
+    assert found.accounted.faults == ()

@@ -8,9 +8,9 @@ import pytest
 from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
-from study.diagnose.varying_candidates import promise
 from study.diagnose.verdict import MISSING
 from study.equations.model_file import parse_model
+from study.identify.time_domain.promised_changes import promised_changes
 from study.records.record import Record
 from study.records.record_layout import Layout
 from study.trials.varying import make_varying_trial
@@ -41,11 +41,28 @@ def test_a_channel_is_named_where_it_explains_more_than_time_does():
     assert found.answer.names == trial.hidden == ("linear_stiffness_over_load",)
 
 
+@pytest.mark.long
+def test_a_schedule_is_seen_beside_a_nonlinearity_that_does_more():
+    _, found = diagnosed("schedule_and_nonlinearity", 2, noise=0.01)
+    assert set(found.answer.names) == {"linear_stiffness_over_load", "cubic_stiffness"}
+
+
 def test_a_linear_system_and_a_cubic_one_promise_no_change_to_search_for():
     for kind in ("nothing", "nonlinear"):
-        trial = make_varying_trial(kind, 3, noise=0.02)
-        seen = promise(compare_records([trial.record], trial.believed).comparison)
+        trial = make_varying_trial(kind, 3, noise=0.02, samples=8192)
+        found = compare_records([trial.record], trial.believed)
+        fit = found.comparison.fit
+        seen = promised_changes(fit, found.comparison.prepared, fit.model.terms)
         assert seen is None or not seen.alone
+        assert not found.put_off
+
+
+def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():
+    trial = make_varying_trial("drift", 4, of="linear_stiffness", change=-0.3, noise=0.01)
+    found = compare_records([trial.record], trial.believed)
+    assert found.put_off
+    assert found.faults == ()
+    assert any("a coefficient seems to change along the record" in note for note in found.comparison.notes)
 
 
 def beam():
@@ -72,3 +89,47 @@ def test_the_stiffness_of_a_beam_follows_the_pin_of_its_support():
     shown = np.sqrt(np.interp(pins, one.at, one.value)) / (2.0 * np.pi)
     assert np.allclose(shown, frequencies, rtol=0.02)
     assert np.sqrt(one.value[0]) / (2.0 * np.pi) == pytest.approx(26.0, rel=0.03)  # the vaguest
+
+
+def band_brake(name: str) -> Record:
+    values = np.genfromtxt(DATA / "friction_damper" / f"{name}0.015forward.csv", delimiter=",", skip_header=1)
+    inch, pound = 25.4, 4.44822
+    columns = {
+        "displacement": (1, inch),
+        "force": (2, 1000.0 * pound),
+        "band1_force": (5, pound),
+        "band2_force": (6, pound),
+    }
+    units = {"displacement": "mm", **dict.fromkeys(("force", "band1_force", "band2_force"), "N")}
+    return Record(values[1, 0], {c: f * values[:, i] for c, (i, f) in columns.items()}, units, name)
+
+
+@pytest.mark.long
+@needs("friction_damper")
+@pytest.mark.parametrize("name", ["harmonic", "step"])
+def test_the_friction_of_a_band_brake_follows_one_band_in_each_direction(name: str):
+    """While it slips, behind the backlash of a reversal: there the velocity is more than 0.6 of its largest."""
+    forward, backward = (
+        f"{{term: coulomb_friction, varies_with: {band}, only: {side}}}"
+        for band, side in (("band2_force", "v > 0"), ("band1_force", "v < 0"))
+    )
+    terms = ("coulomb_friction", forward, backward)
+    model = parse_model("name: brake\nterms:\n" + "".join(f"  - {term}\n" for term in terms), Path("brake.yaml"))
+    found = compare_records([band_brake(name)], model).comparison
+    judged = slice(*found.prepared.plan.judge)
+    velocity, acting = found.record["velocity"][judged], found.record["force"][judged]
+    for sign in (1.0, -1.0):
+        slips = sign * velocity > 0.6 * np.max(np.abs(velocity))
+        assert 1.0 - np.mean(found.prediction.residual[slips] ** 2) / np.var(acting[slips]) > 0.95
+
+
+@pytest.mark.long
+@needs("friction_damper")
+def test_what_a_band_brake_lacks_is_its_bands_and_no_displacement():
+    model = parse_model("name: brake\nterms:\n  - coulomb_friction\n", Path("brake.yaml"))
+    found = diagnose_accounted(compare_records([band_brake("harmonic")], model)).diagnosis
+    assert {"coulomb_friction_forward_over_band2_force", "coulomb_friction_backward_over_band1_force"} <= set(
+        found.answer.names
+    )
+    assert all(name.startswith("coulomb_friction_") for name in found.answer.names)
+    assert found.answer.response_error < 0.05

@@ -87,3 +87,34 @@ def test_a_schedule_that_the_record_does_not_bear_is_refused(entry, words):
     record = recorded(("{term: linear_stiffness, value: 355.0}",), 1024, 0.0, 1, still=np.full(1024, 2.0))
     with pytest.raises(StudyError, match=words):
         fitted(record, entry)
+
+
+def test_a_curve_is_one_input_of_the_reverse_system_however_short_the_record():
+    time = DT * np.arange(1024)
+    warmth = 20.0 + 10.0 * np.sin(2.0 * np.pi * time / 11.0)
+    terms = "{term: linear_stiffness, value: 355.0}", "{term: sched, force: u*(warmth-20)/10, value: -60.0}"
+    found = fitted(recorded(terms, 1024, 0.01, 4, warmth=warmth), "{term: linear_stiffness, varies_with: warmth}")
+    assert [item.terms for item in found.force.inputs][1:] == [("linear_stiffness_over_warmth",)]
+    assert len(found.fit.model.terms[-1].symbols) == 9
+    assert found.prediction.error < 1.2 * found.prediction.floor
+
+
+def test_without_noise_the_band_has_what_the_knots_leave_out():
+    time = DT * np.arange(4096)
+    warmth = 20.0 + 10.0 * np.sin(2.0 * np.pi * time / 61.0)
+    terms = "{term: linear_stiffness, value: 355.0}", "{term: sched, force: u*tanh((warmth-20)/2), value: -60.0}"
+    found = fitted(recorded(terms, 4096, 0.0, 4, warmth=warmth), "{term: linear_stiffness, varies_with: warmth}")
+    (one,) = found.varying
+    away = np.abs(one.value - (355.0 - 60.0 * np.tanh((one.at - 20.0) / 2.0)))
+    assert np.mean(away <= 1.96 * one.error) > 0.9
+    assert np.max(one.error) < 10.0
+
+
+def test_a_step_within_a_judged_block_is_dated_by_it():
+    step = "{term: linear_stiffness, varies_with: time, shape: step, lasts: 0.05, step_at: 40.0, changes: 30.0}"
+    record = recorded(("{term: linear_stiffness, value: 355.0}", step), 4096, 0.02, 5)
+    found = fitted(record, "{term: linear_stiffness, varies_with: time, shape: step}")
+    (one,) = found.varying
+    moment, error = one.step
+    assert abs(moment - 40.0) < 3.0 * error
+    assert error < 0.5
