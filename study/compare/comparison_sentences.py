@@ -62,7 +62,7 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     if len(comparison.views) > 1:
         start += f", most at {comparison.worst.sensor} ({percent(comparison.worst.error)})"
     if comparison.prediction.error >= HOPELESS:
-        # more than one is more than no motion at all would leave
+        # more than that is more than no motion at all would leave
         like = "as a model" if comparison.prediction.error < 1.1 else "more than a model"
         return (
             f"{start}, {like} that never moves would: it cannot follow this record, and its fitted coefficients "

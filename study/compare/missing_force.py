@@ -259,7 +259,7 @@ def _along_a_known_motion(model: Model, keys: Sequence[str], prediction: Predict
         model, prepared.record, prepared.coordinates, np.stack([part.motion(c) for c in model.coordinates], axis=2),
         prediction.misfit, free, prediction.size, np.ones((len(lines), sensors), dtype=np.bool_), lines,
         noises[0].frequency, np.array([noise.rms**2 for noise in noises]),
-        tuple(sorted(shares, key=lambda item: -item[1])), prediction.dt, 0,
+        _ordered(shares), prediction.dt, 0,
     )  # fmt: skip
 
 
@@ -387,7 +387,12 @@ def _aligned(
     lines = np.asarray(rfft(np.stack(seen, axis=1) / prediction.size, size, axis=0), dtype=np.complex128)
     paths = transfer(model, prepared.sensors, prepared.dt, size) / prediction.size[:, None]
     found = [(p, alignment(paths @ np.array(p.direction(model.coordinates)), lines)) for p in places]
-    return tuple(sorted(found, key=lambda item: -item[1]))
+    return _ordered(found)
+
+
+def _ordered(shares: Sequence[tuple[Place, float]]) -> tuple[tuple[Place, float], ...]:
+    """Places with the largest share first; through a single mode all explain the same, but for the last digits."""
+    return tuple(sorted(shares, key=lambda item: -round(item[1], 9)))
 
 
 def _filtered(values: Floats, dt: float, frequency: Floats, gain: Floats) -> Floats:

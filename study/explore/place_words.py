@@ -101,7 +101,12 @@ def _tried(row: Ranked) -> str:
 
 
 def _modes(stage: Stage) -> str:
-    """Modes of the underlying linear system, and with the first candidate where an effect is missing."""
+    """Modes of the underlying linear system, and with the first candidate where an effect is missing.
+
+    None of a component, whose motion is prescribed.
+    """
+    if stage.comparison.model.prescribed:
+        return ""
     before, after = stage.comparison.modes, stage.diagnosis.modes_after if stage.diagnosis is not None else None
     sets = [("as fitted", before)] + ([("with the first candidate", after)] if after is not None else [])
     heads = "".join(f"<th colspan=2>{title}</th>" for title, _ in sets)

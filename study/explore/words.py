@@ -93,7 +93,8 @@ def _figures(comparison: Comparison) -> str:
         size = worst.error * worst.size
         shown = motion(comparison.record.unit(worst.sensor), size)
         about = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {in_percent(1.0 - worst.error)}"
-    unexplained = "of its power unexplained" if comparison.forces else "of the power of those of inertia"
+    of_inertia = not (comparison.forces or comparison.model.prescribed)
+    unexplained = "of the power of those of inertia" if of_inertia else "of its power unexplained"
     cells = (
         ("error", "Error of the response", in_percent(prediction.error), about, PREDICTED),
         ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", FLOOR),

@@ -217,7 +217,7 @@ def test_poles_from_a_subspace_are_exact_without_noise():
     response = np.stack([np.sum(g / ((s - poles) * (s - poles.conj())), axis=1) for g in gains], axis=1)
     rng = np.random.default_rng(1)
     drive = rng.standard_normal((400, 1)) + 1j * rng.standard_normal((400, 1))
-    found = observability(omega, drive, response * drive, 10)
+    found = observability(omega, drive, response * drive, 10, np.zeros(400, dtype=np.int64))
     assert found.singular[4] < 1e-10 * found.singular[0]
     left = sorted(found.poles(4), key=lambda p: p.imag)[2:]
     np.testing.assert_allclose(left, poles, rtol=1e-8)

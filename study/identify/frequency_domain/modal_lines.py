@@ -126,13 +126,13 @@ def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
     motion = np.stack([prepared.record.motion(c) for c in model.coordinates], axis=2)
     forces = prepared.record.columns([name for name, _ in model.forces])
     unit = np.array(unit_forces(model, prepared.record, motion)).reshape(-1, len(forces)).T
-    channels = np.hstack([forces, unit, prepared.measured])
+    channels: Floats = np.hstack([forces, unit, prepared.measured])
     ends = forces.shape[1], forces.shape[1] + unit.shape[1]
     spectra, frequency = list[Complexes](), list[Floats]()
     for first, last in prepared.record.runs(prepared.plan.fit):
-        n, part = last - first, channels[first:last]
-        taper = np.hanning(n + 1)[:-1, None]
-        spectra.append(np.asarray(rfft((part - np.mean(part, axis=0)) * taper, axis=0)[1 : n // 2], np.complex128))
+        n = last - first
+        part: Floats = (channels[first:last] - np.mean(channels[first:last], axis=0)) * np.hanning(n + 1)[:-1, None]
+        spectra.append(np.asarray(rfft(part, axis=0)[1 : n // 2], np.complex128))
         frequency.append(np.arange(1, n // 2) / (n * prepared.dt))
     powers = [np.sum(np.abs(lines[:, : ends[0]]) ** 2, axis=1) / len(lines) for lines in spectra]
     smooth = [np.convolve(power, np.ones(9) / 9.0, "same") for power in powers]
