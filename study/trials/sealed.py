@@ -3,6 +3,7 @@
 import base64
 import binascii
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,7 @@ def unseal(path: Path) -> Answer:
     try:
         page = json.loads(text)
         answer = _answer(json.loads(base64.b64decode(page["answer"], validate=True)))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, binascii.Error):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError, binascii.Error):
         raise StudyError(f"{path}: this holds no sealed answer; expected {ANSWER_FILE}") from None
     alike = len(answer.hidden) == len(answer.shares)
     expect(alike, f"{path}: the answer in it has not a share for each effect; expected {ANSWER_FILE}")
@@ -76,9 +77,24 @@ def unseal(path: Path) -> Answer:
 def _answer(content: Any) -> Answer:
     """What was sealed; any error of a missing key or a wrong type if it is none."""
     fault = content["fault"]
-    imposed = Imposed(fault["fault"], fault["channel"], float(fault["value"]), fault["unit"]) if fault else None
-    hidden, shares = [str(name) for name in content["hidden"]], [float(share) for share in content["shares"]]
-    return Answer(hidden, shares, float(content["noise"]), imposed, str(content["truth"]))
+    imposed = None
+    if fault is not None:
+        name, channel, unit = (_text(fault[key]) for key in ("fault", "channel", "unit"))
+        imposed = Imposed(name, channel, _number(fault["value"]), unit)
+    hidden, shares = [_text(name) for name in content["hidden"]], [_number(share) for share in content["shares"]]
+    return Answer(hidden, shares, _number(content["noise"]), imposed, _text(content["truth"]))
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(value)
+    return value
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError(value)
+    return float(value)
 
 
 def answer_in_words(answer: Answer) -> str:

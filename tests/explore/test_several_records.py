@@ -131,6 +131,12 @@ def test_a_line_breaks_where_time_is_left_out():
     assert np.all(np.isfinite(drawn[0]))
 
 
+DRAWN = (
+    "study.compare.comparison_pictures.comparison_pictures", "study.compare.comparison_pictures.level_pictures",
+    "study.compare.history_picture.history_files",
+)  # fmt: skip
+
+
 def test_a_close_up_shows_one_stretch_of_time(begun):
     for comparison in begun.now.on_each:
         judged = comparison.prediction.of(0)
@@ -140,13 +146,8 @@ def test_a_close_up_shows_one_stretch_of_time(begun):
 
 
 def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
-    for drawn in (
-        "comparison_pictures",
-        "level_pictures",
-        "history_pictures",
-        "diagnosis_files",
-    ):  # by tests of their own
-        monkeypatch.setattr(f"study.explore.saved.{drawn}", lambda *_: {"response.png": b""})
+    for drawn in (*DRAWN, "study.explore.saved.diagnosis_files"):  # by tests of their own
+        monkeypatch.setattr(drawn, lambda *_: {"response.png": b""})
     contents = files(grown, "rig.yaml", model_file.format_model(BELIEVED))
     assert {"low_response.png", "high_response.png", "coefficients_by_level.csv"} <= set(contents)
     assert contents["comparison.csv"].decode().count("\n") == 1 + len(NAMES)
@@ -219,8 +220,8 @@ def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     (level,) = session.now.by_record.levels
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
-    for drawn in ("comparison_pictures", "history_pictures"):
-        monkeypatch.setattr(f"study.explore.saved.{drawn}", lambda *_: {})
+    for drawn in DRAWN:
+        monkeypatch.setattr(drawn, lambda *_: {})
     text = model_file.format_model(BELIEVED)
     for values in (True, False):
         written = files(session, "rig.yaml", text, values=values)["rig.yaml"].decode()

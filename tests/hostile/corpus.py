@@ -296,7 +296,7 @@ def options() -> Iterator[Case]:
         short = " ".join(row).encode("unicode_escape").decode()[:30]
         yield Case(f"compare {short}", ("compare", "rig.csv", "--model", "rig.yaml", *READ, *row), ())
         if row[0] != "--estimator":
-            words = ("add", "rig.yaml", "cubic_stiffness", "--data", "rig.csv", *READ, *row)
+            words = ("add", "rig.yaml", "cubic_stiffness", "--anyway", "--data", "rig.csv", *READ, *row)
             yield Case(f"add {short}", words, ())
     one = ("--column", "force=force", "--column", "displacement=force")
     yield Case("one column twice", ("compare", "rig.csv", "--model", "rig.yaml", *one), ("rig.csv", "'force'"))

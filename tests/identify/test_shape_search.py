@@ -23,7 +23,7 @@ def base() -> SimpleNamespace:
     residual = sum(np.sin(2 * np.pi * line * np.arange(N) / N) for line in LINES)
     residual = residual + 1e-3 * np.random.default_rng(4).standard_normal(N)
     fit = SimpleNamespace(residual=residual, samples=N)
-    return SimpleNamespace(fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"))
+    return SimpleNamespace(prescribed=False, fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"))
 
 
 POINTS = {
@@ -62,7 +62,7 @@ def test_the_pitch_of_a_force_is_that_of_the_residual_over_the_displacement(pitc
         outputs=SimpleNamespace(weights=(1.0,)), samples=N,
     )  # fmt: skip
     base = SimpleNamespace(
-        several=True, fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"),
+        several=True, prescribed=False, fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"),
         paths=lambda size: np.ones((size // 2 + 1, 1, 1)),
     )  # fmt: skip
     found = np.array(shape_search.points_to_try(free(get("cogging")), U, base))[:3, 0]  # to either side of the highest
