@@ -4,7 +4,7 @@ import base64
 import binascii
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -75,10 +75,14 @@ def unseal(path: Path) -> Answer:
 
 
 def _answer(content: Any) -> Answer:
-    """What was sealed; any error of a missing key or a wrong type if it is none."""
-    fault = content["fault"]
+    """What was sealed; any error of a missing key, one too many or a wrong type if it is none."""
+    if set(content) != {field.name for field in fields(Answer)}:
+        raise KeyError(*content)
+    fault: Any = content["fault"]
     imposed = None
-    if fault is not None:
+    if not isinstance(fault, dict):
+        raise TypeError(fault)
+    if fault:
         name, channel, unit = (_text(fault[key]) for key in ("fault", "channel", "unit"))
         imposed = Imposed(name, channel, _number(fault["value"]), unit)
     hidden, shares = [_text(name) for name in content["hidden"]], [_number(share) for share in content["shares"]]
