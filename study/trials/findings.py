@@ -101,7 +101,8 @@ def fault_shown(trial: Trial, found: Sequence[str]) -> str:
     if not imposed or imposed in found:
         return "yes" if imposed else ""
     try:
-        seen = [fault.fault for fault in compared(trial, trial.completed).faults]
+        beside = compared(trial, trial.completed)
+        seen = [fault.fault for fault in (beside.with_all_faults() if beside.put_off else beside).faults]
     except StudyError:
         seen = []
     return "yes" if imposed in seen else "no"

@@ -382,9 +382,9 @@ def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monke
         ahead.set()
         return {"response.png": b"drawn"}
 
-    for name in ("history_pictures", "diagnosis_files"):
-        monkeypatch.setattr(f"study.explore.saved.{name}", lambda *_: {})
-    monkeypatch.setattr("study.explore.saved.comparison_pictures", pictures)
+    for name in ("study.compare.history_picture.history_files", "study.explore.saved.diagnosis_files"):
+        monkeypatch.setattr(name, lambda *_: {})
+    monkeypatch.setattr("study.compare.comparison_pictures.comparison_pictures", pictures)
     text = model_file.format_model(asked.stages[0].model)
     desk, done = Desk(asked, tmp_path / "rig.yaml", text, tmp_path / "out"), threading.Event()
     desk.diagnose()  # known: nothing is asked again, but it is drawn
