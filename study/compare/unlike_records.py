@@ -56,9 +56,8 @@ def unlike_records(fit: FreeRunFit, prepared: Prepared) -> tuple[Unlike, ...]:
         design = np.hstack([each, np.delete(jacobian, [fit.keys.index(key)] if key in fit.keys else [], axis=1)])
         steps = least_squares(design, fit.residual)
         covariance = clustered_covariance(design, fit.residual - design @ steps)[: len(names), : len(names)]
-        apart = np.eye(len(names))[1:] - np.eye(len(names))[:1]  # each but the first, less the first
-        if key == ZERO:
-            apart = np.eye(len(names))
+        each_own = np.eye(len(names))
+        apart = each_own if key == ZERO else each_own[1:] - each_own[:1]  # a coefficient's differences to the first
         wanted = apart @ steps[: len(names)]
         size = float(wanted @ np.linalg.pinv(apart @ covariance @ apart.T) @ wanted)
         p_value = float(chdtrc(len(apart), size)) * len(asked)

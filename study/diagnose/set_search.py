@@ -148,8 +148,9 @@ def _grow(
     for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
         # beside others an effect may leave a side valley
         search.fit([start_without(best, name) for name in best.names])
-        for name in (n for c in others for n in c.names):
-            search.without(frozenset(others[0].names), name)
+        for second in others:
+            for name in second.names:
+                search.without(frozenset(second.names), name)
 
 
 def _counted(progress: Progress, before: int, count: int, of: int, what: str) -> None:
