@@ -134,7 +134,9 @@ def diagnose(
         return found
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
-    other = None if changes is None else _changing(changes, comparison, base, tried, entries, progress, beside=True)
+    if changes is None or not varying_candidates.explains_more(changes, named[0].names):
+        return found
+    other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     return found if other is None or not other.changes else other
 
 
