@@ -36,11 +36,11 @@ class Suspect:
     entries: list[ModelTerm]  # in each shape that is asked for
 
 
-def beside(tried: Sequence[FittedCandidate], changes: PromisedChanges, comparison: Comparison) -> bool:
-    """Whether a change explains as much as half of what the best of other effects does, as fitted to both parts."""
+def first_of_all(tried: Sequence[FittedCandidate], changes: PromisedChanges, comparison: Comparison) -> bool:
+    """Whether a change promises to explain more than the best of other effects does, as fitted to both parts."""
     power = float(np.mean(np.concatenate([comparison.fit.residual, comparison.prediction.residual]) ** 2))
     least = min((c.power for c in tried if not c.unphysical), default=power)
-    return power > 0.0 and changes.most >= 0.5 * (1.0 - least / power)
+    return power > 0.0 and changes.most >= 1.0 - least / power
 
 
 def explains_more(changes: PromisedChanges, effects: Sequence[str]) -> bool:
