@@ -182,6 +182,8 @@ def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     columns: dict[str, list[Floats]] = {}
     target: list[Floats] = []
     for first, last in part.runs((0, len(part))):
+        if not np.any(part["force"][first:last]):  # between blows, where no line is driven
+            continue
         taper = np.hanning(last - first + 1)[:-1]
         frequency = np.asarray(rfftfreq(last - first, part.dt))
         force = np.asarray(rfft(taper * part["force"][first:last]))

@@ -40,8 +40,8 @@ def unfit(model: Model, prepared: Prepared) -> str:
     if held and all(term.name in LINEAR for term in model.terms):
         grows = "with which any motion grows without end; expected a value above zero, or none"
         return f"the model holds {' and '.join(held)}, {grows}"
-    if prepared.free or prepared.response == FORCE or prepared.record.stretches:
-        return ""  # no force, a prescribed motion, or stretches too short to ask: the fit has starts of its own there
+    if prepared.free or prepared.response == FORCE or prepared.record.stretches or len(model.coordinates) > 1:
+        return ""  # no force, a prescribed motion, stretches too short to ask, or more than one mass that moves
     coarse = too_coarse(prepared)
     if coarse:
         return coarse
