@@ -23,6 +23,8 @@ from study.support.arrays import Floats
 from study.support.extras import undrawn
 from study.support.numbers import enumerated, percent
 
+LIKELY = 0.5  # probability from which on a test that was not rehearsed is named beside a diagnosis
+
 
 def rival_in_words(row: Ranked, rows: Sequence[Ranked]) -> str:
     """What a rival has that not all of them have, in words."""
@@ -63,7 +65,7 @@ def advice_in_words(found: NextTest | None) -> str:
     if found is None:
         return ""
     within = "within twice the force and motion of this record"
-    if found.choice.promise < 0.5:
+    if found.choice.promise < LIKELY:
         return (
             f"Of {found.asked} tests {within} none is likely to decide between them; 'study plan' takes other limits."
         )
