@@ -43,7 +43,7 @@ SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
 )
-ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
+ONLY_NOISE = "What is left looks like noise: no missing force stands out over displacement and velocity."
 
 
 def words(stage: Stage, step: int, live: bool) -> dict[str, str]:
