@@ -88,7 +88,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     reading.add_argument(
         "--as-sampled", action="store_true",
-        help="do not thin a record that is sampled finely (decays, components, axes and parts chosen by --use never are)",
+        help="do not thin a finely sampled record (decays, components, axes and parts chosen by --use never are)",
     )  # fmt: skip
     reading.add_argument(
         "--free", action="store_true", help="a free decay: no force acts, and a column of it is ignored"

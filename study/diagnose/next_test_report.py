@@ -122,7 +122,7 @@ def _quantity(value: float, unit: str) -> str:
 
 def _let_go(design: Design, present: PresentTest) -> str:
     if not present.drivers:
-        return f"letting it go at {design.level:.2g} times the level"
+        return f"a release from {design.level:.2g} times the amplitude"
     place = int(np.argmax(np.abs(design.begin[: present.coordinates])))
     at = present.source.coordinates[place] if present.coordinates > 1 else ""
     unit = present.source.unit(Sensor(present.source.coordinates[0], MOTIONS[0]))
