@@ -23,8 +23,6 @@ from study.support.arrays import Floats
 from study.support.extras import undrawn
 from study.support.numbers import enumerated, percent
 
-LIKELY = 0.5  # probability from which on a test that was not rehearsed is named beside a diagnosis
-
 
 def rival_in_words(row: Ranked, rows: Sequence[Ranked]) -> str:
     """What a rival has that not all of them have, in words."""
@@ -60,12 +58,17 @@ def next_test_in_words(found: NextTest) -> str:
     return " ".join(words)
 
 
+def likely(found: NextTest) -> bool:
+    """Whether a test that was not rehearsed is named beside a diagnosis: it decides more likely than not."""
+    return found.choice.promise >= 0.5
+
+
 def advice_in_words(found: NextTest | None) -> str:
     """The test that comes next in a line or two beside a diagnosis, which knows no limits of the user's."""
     if found is None:
         return ""
     within = "within twice the force and motion of this record"
-    if found.choice.promise < LIKELY:
+    if not likely(found):
         return (
             f"Of {found.asked} tests {within} none is likely to decide between them; 'study plan' takes other limits."
         )

@@ -24,7 +24,7 @@ from study.diagnose.confirmed_faults import Diagnosed, diagnose_accounted
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.needless import Needless, needless
 from study.diagnose.next_test import suggested
-from study.diagnose.next_test_report import LIKELY
+from study.diagnose.next_test_report import likely
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
@@ -278,7 +278,7 @@ def with_diagnosis(stage: Stage, found: Diagnosed) -> Stage:
 def with_next_test(stage: Stage) -> Stage:
     """A diagnosed stage with the picture of the next test, as ``study plan`` draws it, where its words name one."""
     found = None if stage.diagnosis is None or undrawn() else suggested(stage.diagnosis)
-    if found is None or found.choice.promise < LIKELY:
+    if found is None or not likely(found):
         return stage
     from study.diagnose.next_test_pictures import next_test_figure
     from study.figures.page import rendered
