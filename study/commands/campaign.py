@@ -25,7 +25,12 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, help="folder of records of one rig, or of rigs of one kind")
-    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        required=True,
+        help="model file (YAML); values in it are held, except those with held: false",
+    )
     parser.add_argument(
         "--by", choices=("record", "level", "date"), default="record",
         help="order of the records: by name (default), by the level of the response, or by the day in the name, as in "

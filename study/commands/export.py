@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML); with --data, what it leaves open is fitted first")
-    ways, to = ("python", "fmu", "modelica"), "a function for solve_ivp, a unit of FMI 2.0, or a class"
+    ways, to = ("python", "fmu", "modelica"), "a function for solve_ivp, an FMU (FMI 2.0), or a Modelica class"
     parser.add_argument("--to", choices=ways, required=True, help=to)
     parser.add_argument(
         "--data", dest="records", type=Path, nargs="+", default=[], metavar="RECORD",
-        help="the record that the values are of, whose units are theirs (default: N, m and s)",
+        help="record whose units the values have, and to which open ones are fitted (default: N, m and s)",
     )  # fmt: skip
     parser.add_argument(
         "--step", type=finite_number(above=0.0),

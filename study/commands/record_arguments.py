@@ -69,14 +69,14 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument("--unit", action="append", default=[], metavar="ROLE=UNIT", help="such as force=kN")
     reading.add_argument(
         "--scale", action="append", default=[], metavar="ROLE=FACTOR",
-        help="factor on the numbers of a column: -1 for a force of the wrong sign; --unit is that of the product",
+        help="multiply a column: -1 for a force of the wrong sign; --unit is then the unit of the result",
     )  # fmt: skip
     rate = reading.add_mutually_exclusive_group()
     rate.add_argument("--fs", type=finite_number(above=0.0), help="sampling rate in Hz, if there is no column of times")
     rate.add_argument("--dt", type=finite_number(above=0.0), help="sampling interval in s, instead of --fs")
     reading.add_argument(
         "--group", action="append", default=[],
-        help="folder or structure of an HDF5 or MATLAB file; several are a record each",
+        help="folder, structure or cell of an HDF5 or MATLAB file; give it again for each further record",
     )  # fmt: skip
     reading.add_argument("--period", type=whole_number(2, 2**40), help="samples in a period of a periodic excitation")
     reading.add_argument("--accept-saturated", action="store_true", help="accept a channel that stays at its limit")
@@ -88,7 +88,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     reading.add_argument(
         "--as-sampled", action="store_true",
-        help="use all samples, though fewer would do (as is always done in decays, components, axes and with --use)",
+        help="do not thin a finely sampled record (decays, components, axes and parts chosen by --use never are)",
     )  # fmt: skip
     reading.add_argument(
         "--free", action="store_true", help="a free decay: no force acts, and a column of it is ignored"

@@ -26,7 +26,10 @@ def add_revision_arguments(parser: argparse.ArgumentParser, between: str) -> Non
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--between", nargs=2, metavar="PLACE", help=f"of a structure: {between}")
     where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
-    parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
+    parser.add_argument(
+        "--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD",
+        help="the record to fit the model to, or several",
+    )  # fmt: skip
     add_reading_arguments(parser)
     add_out_argument(parser)
 

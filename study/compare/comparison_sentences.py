@@ -72,7 +72,7 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     if all(noise.alone for noise in noises):
         source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
-        return f"{start}, which is noise{source}: nothing is above the noise floor of {floor}{doubt}"
+        return f"{start}, which looks like noise{source}: hardly any of it is above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= NEGLIGIBLE:
         return (
             f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.above_noise)} of "

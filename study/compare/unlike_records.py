@@ -86,7 +86,7 @@ def unlike_in_words(found: Sequence[Unlike], model: Model, record: Record) -> st
             said.append(f"each record has a zero of its own: {values} (--each-record constant_force beside that term)")
         else:
             said.append(
-                f"the records want unlike values of {one.key}: {values} (--each-record {entry.term.name}), or an "
-                "effect is missing that their levels show unlike"
+                f"the records ask for different values of {one.key}: {values} (--each-record {entry.term.name}), or an "
+                "effect is missing that shows differently at their levels"
             )
     return "; ".join(said)

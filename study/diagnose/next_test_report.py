@@ -58,12 +58,17 @@ def next_test_in_words(found: NextTest) -> str:
     return " ".join(words)
 
 
+def likely(found: NextTest) -> bool:
+    """Whether a test that was not rehearsed is named beside a diagnosis: it decides more likely than not."""
+    return found.choice.promise >= 0.5
+
+
 def advice_in_words(found: NextTest | None) -> str:
     """The test that comes next in a line or two beside a diagnosis, which knows no limits of the user's."""
     if found is None:
         return ""
     within = "within twice the force and motion of this record"
-    if found.choice.promise < 0.5:
+    if not likely(found):
         return (
             f"Of {found.asked} tests {within} none is likely to decide between them; 'study plan' takes other limits."
         )
@@ -120,7 +125,7 @@ def _quantity(value: float, unit: str) -> str:
 
 def _let_go(design: Design, present: PresentTest) -> str:
     if not present.drivers:
-        return f"letting it go at {design.level:.2g} times the level"
+        return f"a release from {design.level:.2g} times the amplitude"
     place = int(np.argmax(np.abs(design.begin[: present.coordinates])))
     at = present.source.coordinates[place] if present.coordinates > 1 else ""
     unit = present.source.unit(Sensor(present.source.coordinates[0], MOTIONS[0]))

@@ -11,7 +11,7 @@ from study import __version__
 from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.adding import added_candidate
-from study.diagnose.diagnosis_files import all_names, diagnosis_in_words
+from study.diagnose.diagnosis_files import all_names, choices_in_words, diagnosis_in_words
 from study.diagnose.diagnosis_sentences import digits_between, effect_in_words, misses_much
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
@@ -72,7 +72,7 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
         _errors(before, after),
         (diagnosis_in_words(diagnosis), _how_sure(diagnosis)),
         tuple(rows),
-        (*(fault.says for fault in faults), *before.notes),
+        (*(fault.says for fault in faults), *(n for n in before.notes if n not in choices_in_words(before.notes))),
         f"study {__version__}",
         before,
         after,

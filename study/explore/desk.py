@@ -165,6 +165,8 @@ class Desk:
                     self._tell(sessions.with_stage(self.session, alone.now))
             asked = alone
             stage, _ = sessions.examined(asked, count)
+            with self._pen:
+                stage = sessions.with_next_test(stage)
             with self._lock:
                 self._tell(sessions.with_stage(self.session, stage), diagnosing="")
         except OvertakenError:

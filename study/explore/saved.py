@@ -23,7 +23,7 @@ from study.equations import model_file
 from study.explore import html_page
 from study.explore.axis_scales import Columns
 from study.explore.html_page import ROOT, Page, template
-from study.explore.session import Session, Stage, begin_with, with_diagnosis, with_stage, worst
+from study.explore.session import Session, Stage, begin_with, with_diagnosis, with_next_test, with_stage, worst
 from study.explore.view import View
 from study.faults.accounting import Accounted
 from study.support.extras import undrawn
@@ -85,7 +85,8 @@ def of_comparison(comparison: Comparison) -> bytes:
 def of_diagnosis(found: Diagnosed, unneeded: tuple[Needless, ...]) -> bytes:
     """The same of a comparison and its diagnosis, and the terms that the model does not need."""
     session = begin_with(found.accounted)
-    return saved(with_stage(session, with_diagnosis(replace(session.now, unneeded=unneeded), found)))
+    stage = with_diagnosis(replace(session.now, unneeded=unneeded), found)
+    return saved(with_stage(session, with_next_test(stage)))
 
 
 def _in_script(content: object) -> str:

@@ -23,17 +23,21 @@ from study.diagnose.candidates import FittedCandidate, Progress
 from study.diagnose.confirmed_faults import Diagnosed, diagnose_accounted
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.needless import Needless, needless
+from study.diagnose.next_test import suggested
+from study.diagnose.next_test_report import likely
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, search_base
 from study.equations.model import Model, free
 from study.equations.terms import Term, custom, is_own
 from study.faults.accounting import Accounted
+from study.figures.styles import in_style
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.record_layout import records_judged
 from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
+from study.support.extras import undrawn
 
 Step = dict[str, Any]
 SHOWN = 12  # candidates
@@ -77,6 +81,7 @@ class Stage:
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
     on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
     by_record: ByRecord | None = None  # coefficients of each record's own; None as long as nobody has asked
+    next_test: bytes = b""  # PNG of what tied effects would answer to the test that decides, if one is likely to
 
     @property
     def comparison(self) -> Comparison:
@@ -268,6 +273,18 @@ def with_diagnosis(stage: Stage, found: Diagnosed) -> Stage:
         unneeded_in_words(stage.unneeded or (), found.diagnosis),
     )
     return _foreseen(replace(stage, diagnosis=found.diagnosis, said=" ".join(said for said in words if said)))
+
+
+def with_next_test(stage: Stage) -> Stage:
+    """A diagnosed stage with the picture of the next test, as ``study plan`` draws it, where its words name one."""
+    found = None if stage.diagnosis is None or undrawn() else suggested(stage.diagnosis)
+    if found is None or not likely(found):
+        return stage
+    from study.diagnose.next_test_pictures import next_test_figure
+    from study.figures.page import rendered
+
+    with in_style():
+        return replace(stage, next_test=rendered(next_test_figure(found), "png"))
 
 
 def _foreseen(stage: Stage) -> Stage:

@@ -1,6 +1,7 @@
 """The words of a page as fragments of HTML, by the name of their place; whatever a user typed is escaped."""
 
 import math
+from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 
@@ -42,7 +43,7 @@ SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
 )
-ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
+ONLY_NOISE = "What is left looks like noise: no missing force stands out over displacement and velocity."
 
 
 def words(stage: Stage, step: int, live: bool) -> dict[str, str]:
@@ -53,6 +54,7 @@ def words(stage: Stage, step: int, live: bool) -> dict[str, str]:
         "says": escape(in_sentence(comparison_in_words(comparison, diagnosed))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, live),
+        "next-test": _next_test(stage),
         "equation": equation(stage),
         "equation-values": equation(stage, values=True),
         "only-noise": ONLY_NOISE if comparison.growths is None else "",
@@ -118,6 +120,14 @@ def _verdict(stage: Stage, live: bool) -> str:
         return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
     head = VERDICTS.get(stage.diagnosis.verdict, UNKNOWN)
     return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(in_sentence(stage.said))}</p>"
+
+
+def _next_test(stage: Stage) -> str:
+    """The picture of what tied effects would answer to the test that decides; empty where there is none."""
+    if not stage.next_test:
+        return ""
+    what = "What drives the test, what each of the tied effects would answer, and how the evidence grows"
+    return f"<img alt='{what}' src='data:image/png;base64,{b64encode(stage.next_test).decode()}'>"
 
 
 def _candidates(stage: Stage, live: bool) -> str:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from study.faults.fault import Given
     from study.interface.fitted import Fit
+    from study.interface.found import Candidate
 
 Samples = tuple[int, int | None]  # the first, and the one after the last
 Times = tuple[float, float | None]  # seconds
@@ -290,9 +291,17 @@ class Model:
         return self.equation.coordinates if self.equation.named else ()
 
     def add(
-        self, added: "str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
+        self, added: "Candidate | str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
     ) -> "Model":  # fmt: skip
-        """The model with a term more, of a structure at its place; a ``StudyError`` if it has that force already."""
+        """The model with a term more, of a structure at its place; a ``StudyError`` if it has that force already.
+
+        Of a candidate of a diagnosis every effect is added, at its place; a fit starts from the values found there.
+        """
+        from study.interface.found import Candidate
+
+        if isinstance(added, Candidate):
+            fitted = {t.name: t for t in added.ranked.fit.model.terms}
+            return self._with_terms(*self.equation.terms, *(fitted[name].opened() for name in added.ranked.names))
         entry = term(added) if isinstance(added, str) else added
         if at is not None or between is not None:
             entry = replace(entry, place=_place(entry.term.name, at, between))

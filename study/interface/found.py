@@ -1,5 +1,8 @@
 """Which effect is missing: the diagnosis of a fit."""
 
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -12,7 +15,7 @@ from study.diagnose.user_candidates import check_on, own_candidates, unfitted, u
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
-from study.interface.showing import TABLES, Words, drawing_axes, html_table
+from study.interface.showing import ABOVE, TABLES, Words, drawing_axes, html_table
 from study.support.errors import expect
 from study.support.extras import needed
 from study.support.numbers import percent
@@ -210,7 +213,9 @@ class Diagnosis:
         with drawing_axes(ax) as (axes,):
             from study.diagnose.diagnosis_pictures import FOLLOWED, followed
 
-            return followed(axes, self.result.candidates[:FOLLOWED], along)
+            followed(axes, self.result.candidates[:FOLLOWED], along)
+            axes.legend(**ABOVE)
+        return axes
 
     def __repr__(self) -> str:
         """One line: verdict, and the best candidate if there is one."""

@@ -3,7 +3,7 @@
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.support.extras import DRAWING, needed
 
@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDTH, HEIGHT = 7.0, 2.6  # inches of one panel
+# of a legend: above the panel, where it hides nothing
+ABOVE: dict[str, Any] = {
+    "loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "borderaxespad": 0.2
+}  # fmt: skip
 TABLES = ("pandas", "a table in a notebook", "notebook")  # what ``extras.needed`` asks for
 
 

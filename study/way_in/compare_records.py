@@ -55,7 +55,8 @@ def made_ready(
     one_mass = len(model.coordinates) == 1 and not (model.modal or model.prescribed)
     expect(
         layout.near is None or one_mass,
-        "--near is the mode that a single mass is fitted to; expected --up-to, or all modes, of anything else",
+        "--near chooses the mode of a single mass alone; of a structure start values (held: false) choose the modes, "
+        "and --up-to leaves out those above",
     )
     model, records, said = driven_alike(records, model, absolute)
     if layout.highest is not None:

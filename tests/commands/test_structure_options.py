@@ -131,7 +131,7 @@ def test_a_record_in_millimetres_stays_in_millimetres(folder):
     (("--fs", "10"), "its times step by 0.02 s"),
     (("--period", "7"), "the force 'shaker' 7 samples later differs"),
     (("--use", "0:9", "--fit", "0:100"), "--use and --fit or --judge A:B exclude each other"),
-    (("--near", "2"), "--near is the mode that a single mass is fitted to"),
+    (("--near", "2"), "--near chooses the mode of a single mass"),
     (("--cutoff", "40"), "the cut-off is 40 Hz; expected it above 0 and below 25 Hz"),
 ])  # fmt: skip
 def test_what_a_structure_cannot_have_is_refused_in_one_sentence(folder, capsys, words, said):

@@ -68,7 +68,7 @@ def test_where_nothing_is_missing_the_error_is_the_noise_and_it_says_so(seed: in
         prediction.floor, abs=4.0 * prediction.of(0).noise.error / prediction.of(0).size
     )
     assert prediction.above_noise == 0.0
-    assert "which is noise" in comparison_in_words(comparison)
+    assert "which looks like noise" in comparison_in_words(comparison)
     assert comparison.growths is None
 
 

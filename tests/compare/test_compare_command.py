@@ -241,7 +241,7 @@ def test_the_bouc_wen_record_is_no_function_of_the_motion_and_hysteresis_reaches
     held = "{term: hysteresis, beta: 800.0, gamma: -1100.0}"  # the published system
     Path("rig.yaml").write_text(LINEAR.replace("linear_stiffness]", f"linear_stiffness, {held}]"))
     assert cli.main(words) == 0
-    assert "which is noise (from the scatter between periods)" in capsys.readouterr().out
+    assert "which looks like noise (from the scatter between periods)" in capsys.readouterr().out
 
 
 def test_a_record_too_short_to_be_fitted_is_refused_for_that(capsys: pytest.CaptureFixture[str]) -> None:

@@ -28,7 +28,7 @@ def notes(*records: Record) -> str:
 
 def test_two_assemblies_want_a_stiffness_each():
     said = notes(decay("first", k=692.6), decay("second", k=703.6, seed=2))
-    assert "the records want unlike values of k: 69" in said
+    assert "the records ask for different values of k: 69" in said
     assert "--each-record linear_stiffness" in said
 
 
@@ -41,4 +41,4 @@ def test_two_runs_have_a_zero_each():
 def test_alike_records_want_nothing_of_their_own(seed: int):
     said = notes(decay("first", seed=seed), decay("second", seed=seed + 20), decay("third", seed=seed + 40))
     assert "each record" not in said
-    assert "want unlike" not in said
+    assert "different values" not in said

@@ -17,6 +17,9 @@ from study.diagnose.precision import precise_test
 from study.diagnose.separation import allowed, limit_share, own_limits, respond, rivals_of, root_of_inverse
 from study.diagnose.verdict import diagnose
 from study.equations.terms import LIBRARY
+from study.explore.session import begin_with, with_next_test
+from study.explore.words import words
+from study.faults.accounting import Accounted
 from study.identify.time_domain.part_fit import fit_part
 from study.interface.planned import planned
 from study.records.interpolation import between_samples
@@ -251,3 +254,12 @@ def test_a_notebook_has_the_same_plan(diagnosis, plan, tmp_path):
     assert (tmp_path / "plan" / "next_test.wav").is_file()
     with pytest.raises(StudyError, match="expected one value and a share of it"):
         planned(diagnosis, (None, None, None), {"c": 0.1, "k": 0.1})
+
+
+def test_the_page_shows_what_each_rival_would_answer_and_nothing_where_there_is_no_tie(diagnosis):
+    stage = replace(begin_with(Accounted.as_compared(diagnosis.comparison)).now, diagnosis=diagnosis)
+    shown = with_next_test(stage)
+    assert shown.next_test.startswith(b"\x89PNG")
+    assert "src='data:image/png;base64," in words(shown, 0, live=False)["next-test"]
+    alone = replace(diagnosis, sets=diagnosis.sets[:1])
+    assert words(with_next_test(replace(stage, diagnosis=alone)), 0, live=False)["next-test"] == ""

@@ -109,6 +109,13 @@ def test_a_candidate_is_added_as_the_command_adds_it_by_name(fit, better):
     assert better.drop("cubic_stiffness").error == pytest.approx(fit.error, rel=1e-3)
 
 
+def test_a_candidate_added_to_the_model_brings_what_was_found_as_a_start(fit, found):
+    model = fit.given.add(found.best)
+    assert model.terms == (*fit.given.terms, "cubic_stiffness")
+    assert model.values["k3"] == pytest.approx(found.best.coefficient)
+    assert model.equation.values["k3"] is None, "held by no fit"
+
+
 def test_models_are_ranked_with_the_error_of_the_difference(fit, better):
     table = st.compare([fit, better]).to_frame()
     assert table["error"].is_monotonic_increasing

@@ -69,13 +69,15 @@ def test_a_scale_beside_the_file_holds(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_record(path)["force"], -2.0 * shaken()[:, 0])
 
 
-def test_junk_and_rest_before_the_motion_are_said_with_what_leaves_them_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("last", [10.0, 1.5], ids=["far outside", "less far outside"])
+def test_junk_and_rest_before_the_motion_are_said_with_what_leaves_them_out(tmp_path: Path, last: float) -> None:
     still = np.zeros((1000, 2)) + 1e-9 * np.random.default_rng(1).standard_normal((1000, 2))
     values = np.concatenate([still, shaken()])
-    values[:4, 1] = [10.0, 10.0, -10.0, 10.0]
+    values[:4, 1] = np.max(np.abs(values[:, 1])) * np.array([10.0, 10.0, -last, last])
     (said,) = read_record(written(tmp_path / "rig.csv", values)).remarks
-    assert said.startswith("samples 0 to 3 of displacement lie far outside all others and the first ")
-    assert "(--use 4." in said
+    assert f"samples 0 to {3 if last == 10.0 else 1} of displacement lie far outside all others" in said
+    assert "and the first 5 s are at rest" in said
+    assert "(--use 5:" in said
 
 
 def test_a_decay_begins_loud_and_that_is_no_junk(tmp_path: Path) -> None:

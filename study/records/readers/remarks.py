@@ -35,9 +35,11 @@ def on_samples(record: Record) -> tuple[str, ...]:
         where = enumerated([channel for channel, samples in far.items() if samples])
         one = f"the first sample of {where} lies"
         said.append(f"{one if begin == 1 else f'samples 0 to {begin - 1} of {where} lie'} far outside all others")
-    still = begin + _rest([record[channel][begin:] for channel in (*record.forces, *sensors)]) if driven else begin
-    if still - begin > len(record) // 10:  # a shorter rest is hardly worth a word
-        said.append(f"the first {(still - begin) * record.dt:.3g} s are at rest")
+    # lesser junk may follow, in the hundredth of the record in which that was looked for
+    after = max(begin, len(record) // 100) if begin else 0
+    still = after + _rest([record[channel][after:] for channel in (*record.forces, *sensors)]) if driven else begin
+    if still - after > len(record) // 10:  # a shorter rest is hardly worth a word
+        said.append(f"the first {still * record.dt:.3g} s are at rest")
         begin = still
     at = record.start + begin * record.dt
     left_out = f"{' and '.join(said)}: that says nothing about the motion ({LEAVING_OUT}{at:.6g}: starts after it)"
