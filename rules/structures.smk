@@ -5,7 +5,7 @@ with one_sentence():
     STRUCTURES = load_structures(Path("config"), list(STUDY.cases))
 
 CODE["structure"] = rests_on(Path("scripts/structure_case.py"))
-# What is made of a case: in reverse, equation by equation, or by its modes where the linear part is as measured.
+# What is made of a case: in reverse, equation by equation, or by its modes.
 STRUCTURE_TABLES = {
     "": {
         "record": "record", "responses": "frequency_response", "coherences": "coherence", "parameters": "parameters",
@@ -23,13 +23,13 @@ STRUCTURE_TITLES = {case.case: case.title for case in STRUCTURES.cases.values()}
 STRUCTURE_PICTURES = [
     {"file": f"figures/{case.case}_{kind}.png", "system": "structures", "number": case.title, "shows": shows}
     for case in STRUCTURES.cases.values()
-    for kind, shows in STRUCTURE_FIGURES[case.measured].items()
+    for kind, shows in STRUCTURE_FIGURES[case.modal].items()
 ]
 
 
 def structure_products(case):
     """Everything that is made of a case of structures."""
-    way = STRUCTURES.cases[case].measured
+    way = STRUCTURES.cases[case].modal
     tables = [f"results/{case}/{name}.csv" for name in STRUCTURE_TABLES[way].values()]
     return tables + [path for kind in STRUCTURE_FIGURES[way] for path in pictures(f"{case}_{kind}")]
 
@@ -44,11 +44,13 @@ for _name, _case in STRUCTURES.cases.items():
             style=STYLE,
             code=CODE["structure"],
         output:
-            **{kind: f"results/{_name}/{name}.csv" for kind, name in STRUCTURE_TABLES[_case.measured].items()},
-            **{f"draw_{kind}": pictures(f"{_name}_{kind}") for kind in STRUCTURE_FIGURES[_case.measured]},
+            **{kind: f"results/{_name}/{name}.csv" for kind, name in STRUCTURE_TABLES[_case.modal].items()},
+            **{f"draw_{kind}": pictures(f"{_name}_{kind}") for kind in STRUCTURE_FIGURES[_case.modal]},
         params:
             case=_case.plain(),
-            settings=STRUCTURES.settings.plain(),
+            record=STRUCTURES.record_settings(_name).plain(),
+            settings=STRUCTURES.identification_settings(_name).plain(),
+            limits=STRUCTURES.settings.claims.plain(),
         benchmark:
             f"results/benchmarks/structure.{_name}.tsv"
         script:

@@ -9,46 +9,41 @@ from study.figures import page
 from study.records.prepared import prepare_record
 from study.records.record import write_csv
 from study.reproduction import structure_figures, structure_tables, tables
-from study.reproduction.structure_cases import (
-    StructureCase,
-    StructureSettings,
-    identify_structure,
-    make_structure_record,
-    measured_model,
-)
+from study.reproduction.cases import make_record
+from study.reproduction.settings import IdentificationSettings, RecordSettings
+from study.reproduction.structure_cases import ClaimLimits, StructureCase, identify_equations, modal_model
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence
 
 
 def main(
     model: Path, style: Path, outputs: Mapping[str, Path], pictures: Mapping[str, Sequence[Path]], case: StructureCase,
-    settings: StructureSettings,
+    made_by: RecordSettings, settings: IdentificationSettings, limits: ClaimLimits,
 ) -> None:  # fmt: skip
     structure, title = read_model(model), case.title
-    record = make_structure_record(structure, case, settings)
+    record = make_record(structure, made_by)
     with replacing(outputs["record"]) as beside:
         write_csv(record, beside)
-    if case.measured:  # by its own modes
-        assumed = measured_model(structure, case.sensors)
-        comparison = compare(assumed, prepare_record(record))
-        told = (case, structure, comparison, settings)
-        responses = structure_tables.modal_responses(*told)
+    if case.modal:
+        comparison = compare(modal_model(structure, case.sensors), prepare_record(record))
+        highest = made_by.excitation.at_level(made_by.level).highest
+        responses = structure_tables.modal_responses(structure, comparison, settings, highest)
         made = {
             "responses": responses,
-            "parameters": structure_tables.modal_parameters(*told),
-            "claims": structure_tables.modal_claims(*told),
+            "parameters": structure_tables.modal_parameters(structure, comparison, settings),
+            "claims": structure_tables.modal_claims(structure, comparison, settings, limits, case.noise),
         }
         figures = {"measured": lambda: structure_figures.modal_figure(responses, title)}
     else:  # by its equations of motion
-        result = identify_structure(structure, record, case, settings)
+        result = identify_equations(structure, record, settings)
         responses = structure_tables.structure_responses(result)
         coherences = structure_tables.structure_coherences(result)
         made = {
             "responses": responses,
             "coherences": coherences,
-            "parameters": structure_tables.structure_parameters(case.case, result, settings),
+            "parameters": structure_tables.structure_parameters(result, settings),
             "reactions": structure_tables.structure_reactions(case.case, result),
-            "claims": structure_tables.structure_claims(case, record, result, settings),
+            "claims": structure_tables.structure_claims(record, result, settings, limits),
         }
         figures = {
             "connections": lambda: structure_figures.connections_figure(responses, title),
@@ -67,5 +62,6 @@ if "snakemake" in globals():
         main(
             Path(step.input.model), Path(step.input.style), made,
             {kind.removeprefix("draw_"): paths for kind, paths in drawn.items()},
-            StructureCase.model_validate(step.params.case), StructureSettings.model_validate(step.params.settings),
+            StructureCase.model_validate(step.params.case), RecordSettings.model_validate(step.params.record),
+            IdentificationSettings.model_validate(step.params.settings), ClaimLimits.model_validate(step.params.limits),
         )  # fmt: skip

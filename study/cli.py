@@ -46,7 +46,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return _end(PIPE_CLOSED)
     except OSError as error:
-        return _end(BAD_INPUT, _file_trouble(error))
+        where = f"{error.filename}: " if error.filename is not None else ""
+        why = error.strerror or str(error)
+        return _end(BAD_INPUT, f"{where}{why}; expected a readable file, and a writable folder with free space")
     except MemoryError:
         return _end(BAD_INPUT, "there is not enough memory for this; ask for fewer samples")
     except ModuleNotFoundError as error:
@@ -70,12 +72,6 @@ def _run(argv: Sequence[str] | None) -> None:
 
 def _fault(error: Exception) -> int:
     return _end(FAULT, f"a fault in the program, not in your input ({_place(error)}); please report it")
-
-
-def _file_trouble(error: OSError) -> str:
-    where = f"{error.filename}: " if error.filename is not None else ""
-    why = error.strerror or str(error)
-    return f"{where}{why}; expected a readable file, and a writable folder with free space"
 
 
 def _place(error: Exception) -> str:

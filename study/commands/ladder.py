@@ -1,6 +1,6 @@
 """A ladder: a measured record compared with model after model, each with a term more, judged on what was not fitted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,7 +49,9 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     Faults of the measurement are corrected as the first model has them, as a climb begins. A step whose model cannot be
     fitted has the reason as its note.
     """
-    options = _with_fit(row.options, ladder.fit)
+    options = list(row.options)
+    if ladder.fit:
+        options[options.index("--fit") + 1] = ladder.fit
     model = read_model(Path(row.model))
     arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
@@ -75,14 +77,6 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             "unit": found.record.units.get(str(worst.sensor), ""), "floor": found.prediction.floor, "note": "",
         })  # fmt: skip
     return pd.DataFrame(rows, columns=COLUMNS)
-
-
-def _with_fit(options: Sequence[str], fit: str) -> list[str]:
-    """The options with other samples to fit, where some are given."""
-    words = list(options)
-    if fit:
-        words[words.index("--fit") + 1] = fit
-    return words
 
 
 def missing_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:

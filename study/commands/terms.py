@@ -51,9 +51,11 @@ def details(term: "Term") -> str:
     listing = tabulate(
         rows, ["", "symbol", "SI unit", "stands before, or is"], tablefmt="simple", disable_numparse=True
     )
+    values = ["value"] if len(term.symbols) == 1 else ["amplitude", "phase"]
+    given = ", ".join(f"{name}: ..." for name in (*(p.name for p in term.parameters), *values))
     return (
         f"{term.name}: {term.formula}\n  meaning       {term.meaning}\n  common cause  {term.cause}\n\n{listing}\n\n"
-        f"In a model file:\n  - {term.name}\n  - {{term: {term.name}, {', '.join(_given(term))}}}"
+        f"In a model file:\n  - {term.name}\n  - {{term: {term.name}, {given}}}"
     )
 
 
@@ -62,11 +64,6 @@ def _shape(term: "Term", symbol: str) -> str:
     derivative = {0: "", 1: "d/dt ", 2: "d2/dt2 "}[component.order]
     factor = "" if component.factor == 1.0 else f"{component.factor:.6g} "
     return f"{factor}{derivative}{component.shape}"
-
-
-def _given(term: "Term") -> list[str]:
-    values = ["value"] if len(term.symbols) == 1 else ["amplitude", "phase"]
-    return [f"{name}: ..." for name in (*(p.name for p in term.parameters), *values)]
 
 
 COMMAND = Command(

@@ -105,14 +105,10 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
 
 def _segments(stretches: Sequence[int], inputs: int) -> Segments:
     """The usual segments, shortened until there are enough averages for so many inputs; lengths of the stretches."""
-    cut = segments_of(sum(stretches))
-    while cut.length > FEWEST and _averages(cut, stretches) < FEWEST_AVERAGES * inputs:
+    cut, wanted = segments_of(sum(stretches)), FEWEST_AVERAGES * inputs
+    while cut.length > FEWEST and sum(cut.effective_averages(n) for n in stretches if n >= cut.length) < wanted:
         cut = replace(cut, length=cut.length // 2)
     return cut
-
-
-def _averages(cut: Segments, stretches: Sequence[int]) -> float:
-    return sum(cut.effective_averages(n) for n in stretches if n >= cut.length)
 
 
 def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floats:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from study.compare import panels
 from study.compare.comparison import Comparison
-from study.compare.decay import Decay, Decays
+from study.compare.decay import Decays
 from study.compare.loops import loops
 from study.equations import dimensions
 from study.figures import page
@@ -25,7 +25,11 @@ def decay_figure(comparison: Comparison, found: Decays) -> Figure:
         rows=2, width=WIDE, panel=2.2,
     )  # fmt: skip
     for axis, what, name in zip(axes, ("frequency", "damping"), ("frequency (Hz)", "damping ratio"), strict=True):
-        _points(axis, found.measured, what)
+        seen = found.measured
+        axis.errorbar(
+            seen.amplitude, getattr(seen, what), 2.0 * getattr(seen, f"{what}_error"), fmt="o", markersize=3.0,
+            color="0.45", elinewidth=0.8, label="measured",
+        )  # fmt: skip
         if found.predicted is not None:
             order = np.argsort(found.predicted.amplitude)
             axis.plot(found.predicted.amplitude[order], getattr(found.predicted, what)[order], **panels.PREDICTED)
@@ -35,14 +39,6 @@ def decay_figure(comparison: Comparison, found: Decays) -> Figure:
     page.letter(axes, ("frequency", "damping ratio"))
     page.shared_legend(figure, axes)
     return figure
-
-
-def _points(axis: panels.Axes, found: Decay, what: str) -> None:
-    errors = 2.0 * getattr(found, f"{what}_error")
-    axis.errorbar(
-        found.amplitude, getattr(found, what), errors, fmt="o", markersize=3.0, color="0.45", elinewidth=0.8,
-        label="measured",
-    )  # fmt: skip
 
 
 def loops_figure(comparison: Comparison) -> Figure:

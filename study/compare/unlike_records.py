@@ -17,7 +17,6 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import with_states
 from study.records.prepared import FORCE, Prepared
 from study.records.record import Record
-from study.support.arrays import Floats
 from study.support.least_squares import least_squares
 from study.support.numbers import enumerated
 from study.support.statistics import clustered_covariance
@@ -46,7 +45,9 @@ def unlike_records(fit: FreeRunFit, prepared: Prepared) -> tuple[Unlike, ...]:
     if len(names) < 2 or apart_already or fit.restarts or fit.model.modal or prepared.response == FORCE or not fit.keys:
         return ()
     jacobian, sensors = with_states(fit, prepared), len(prepared.outputs)
-    owner = np.repeat(_owners(prepared, names), sensors)
+    first, last = prepared.plan.fit
+    owners = np.concatenate([np.full(len(s), names.index(s.source.name)) for s in prepared.record.stretches])
+    owner = np.repeat(owners[first:last], sensors)  # of each residual the number of its record
     asked = {key: jacobian[:, i] for i, key in enumerate(fit.keys)}
     if prepared.free and sensors == 1 and prepared.response == "displacement":
         asked[ZERO] = np.ones(len(owner))
@@ -66,13 +67,6 @@ def unlike_records(fit: FreeRunFit, prepared: Prepared) -> tuple[Unlike, ...]:
             values = dict(zip(names, (own + steps[: len(names)]).tolist(), strict=True))
             found.append(Unlike(key, values, p_value))
     return tuple(sorted(found, key=lambda unlike: unlike.p_value))
-
-
-def _owners(prepared: Prepared, names: list[str]) -> Floats:
-    """For each sample of the fitting part the number of its record."""
-    first, last = prepared.plan.fit
-    owners = np.concatenate([np.full(len(s), names.index(s.source.name)) for s in prepared.record.stretches])
-    return owners[first:last]
 
 
 def unlike_in_words(found: Sequence[Unlike], model: Model, record: Record) -> str:

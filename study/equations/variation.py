@@ -111,11 +111,15 @@ def varying(variation: Variation) -> Term:
     word = f"_{SIDES[variation.side]}" if variation.side else ""
     if variation.shape == "step":
         word += "_step"
+    several = len(variation.functions) > 1
     components = [
-        Component(symbol, f"{function}*({_on_one_side(_force(c), variation.side)})", 0, c.factor)
+        Component(
+            f"{c.symbol}{word}_{along}{f'_{j}' if several else ''}",
+            f"{function}*({_on_one_side(_force(c), variation.side)})", 0, c.factor,
+        )
         for c in of.components
-        for symbol, function in zip(_symbols(c.symbol, variation, word), variation.functions, strict=True)
-    ]
+        for j, function in enumerate(variation.functions, start=2)
+    ]  # fmt: skip
     with_what = "along time" if along == ALONG_TIME else f"with {along}"
     told = f" where {variation.side}" if variation.side else ""
     how = {"curve": "changes", "line": "changes evenly", "step": "changes at once"}[variation.shape]
@@ -151,11 +155,6 @@ def _step_at() -> ShapeParameter:
         STEP_AT, OF_VARIATION, "value at which it steps",
         Search("quantiles of what it varies with", ABOUT, blunt=True), (0.2, 0.8), signed=True,
     )  # fmt: skip
-
-
-def _symbols(symbol: str, variation: Variation, word: str) -> list[str]:
-    base, count = f"{symbol}{word}_{variation.along}", len(variation.functions)
-    return [base] if count == 1 else [f"{base}_{j}" for j in range(2, count + 2)]
 
 
 def _force(component: Component) -> str:

@@ -45,7 +45,7 @@ class FormulaText:
         uses = Counter(operand for n in needed for operand in set(self._operands(n)))
         taken = set(self.names.values())
         for n in needed:
-            if n in self.given or self._is_leaf(n):
+            if n in self.given or self.graph.nodes[n][0] in (Op.INPUT, Op.CONST):
                 continue
             name = self.names.get(n)
             if name is None and uses[n] > 1 and self._factors(n) is None:
@@ -58,9 +58,6 @@ class FormulaText:
 
     def __getitem__(self, node: int) -> str:
         return self._of(node)[0]
-
-    def _is_leaf(self, n: int) -> bool:
-        return self.graph.nodes[n][0] in (Op.INPUT, Op.CONST)
 
     def _operands(self, n: int) -> tuple[int, ...]:
         """Nodes that the text of this one names: of a power the base."""

@@ -42,7 +42,10 @@ import numpy as np
 STATES = [{", ".join(f'"{q.name}"' for q in made.states)}]
 VALUES = {{
 '''
-    listed = "".join(f'    "{q.name}": {q.value!r},  # {_meaning(q)}\n' for q in made.parameters)
+    meanings = [f"{q.unit}; {q.meaning}" if q.unit else q.meaning for q in made.parameters]
+    listed = "".join(
+        f'    "{q.name}": {q.value!r},  # {meaning}\n' for q, meaning in zip(made.parameters, meanings, strict=True)
+    )
     rates = [*made.equations.motion[1], *made.equations.slopes]
     given = f"(t, state{driven}, values=VALUES)"
     body, results = _body(made, rates, names, {})
@@ -60,16 +63,11 @@ VALUES = {{
 
 
 def _listed(title: str, quantities: Iterable[Quantity]) -> str:
-    rows = "".join(f"    {_with_unit(q)}{'' if q.meaning == q.name else ': ' + q.meaning}\n" for q in quantities)
+    rows = ""
+    for q in quantities:
+        named = f"{q.name} [{q.unit}]" if q.unit else q.name
+        rows += f"    {named}{'' if q.meaning == q.name else ': ' + q.meaning}\n"
     return f"{title}\n{rows}" if rows else ""
-
-
-def _with_unit(q: Quantity) -> str:
-    return f"{q.name} [{q.unit}]" if q.unit else q.name
-
-
-def _meaning(q: Quantity) -> str:
-    return f"{q.unit}; {q.meaning}" if q.unit else q.meaning
 
 
 def _body(

@@ -104,8 +104,10 @@ class Record(records.Record):
             axes.set(xlabel="time (s)", ylabel=f"{name} ({self.units.get(name, '')})", title=self.name)
         return axes
 
-    def plot_spectrum(self, channel: str = "force", ax: "Axes | None" = None) -> "Axes":
+    def plot_spectrum(self, channel: str | None = None, ax: "Axes | None" = None) -> "Axes":
         """Root of one channel's autospectral density (Welch, Hann, half overlap), in unit/sqrt(Hz).
+
+        That of the first force, or of the first measured motion where there is none, if no channel is named.
 
         Raises
         ------
@@ -115,7 +117,8 @@ class Record(records.Record):
         from study.compare.noise import segments_of
         from study.records.spectra import autospectrum
 
-        values = self[self._known(channel)]
+        channel = self._known(channel or (*self.forces, *map(str, self.sensors))[0])
+        values = self[channel]
         frequency, density = autospectrum(values, self.dt, segments_of(len(values)))
         with drawing_axes(ax) as (axes,):
             axes.semilogy(frequency[1:], np.sqrt(density[1:]), linewidth=1.0)

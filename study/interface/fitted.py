@@ -228,15 +228,13 @@ class Fit(FitPictures):
         force : Force, Record or array of shape (n,)
             An array has the sampling interval of the record that was fitted.
         initial : sequence of float
-            Displacement and velocity at the first sample.
+            Displacement of every coordinate at the first sample, then the velocities.
 
         Raises
         ------
         StudyError
-            If the response does not stay finite.
+            If a force is missing, or the response does not stay finite.
         """
-        structure = "a structure is not simulated in a notebook; 'study simulate' takes its model file"
-        expect(not self.given.coordinates, f"{structure}, and Fit.model.save writes one")
         if not isinstance(force, Force | Record):
             values = np.asarray(force, dtype=np.float64)
             expect(values.ndim == 1 and len(values) > 1, f"force has the shape {values.shape}; expected one row")

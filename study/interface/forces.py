@@ -1,8 +1,7 @@
 """Forces to simulate a model with: seeded, and the same bytes each time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from study.interface.equation import Model
 from study.records.excitation import Excitation, displacement_noise
 from study.records.excitation import force as history
 from study.support.arrays import Floats
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 SAMPLES, DT = 8192, 0.02
 
@@ -108,36 +107,42 @@ def simulate(
     model : Model
         Every value given.
     force : Force or Record
-        Of a record its force, and the further channels that the model's formulas name.
+        On the model's one force, or of a record all of its forces and the further channels that its formulas name.
     noise : float
-        Mean square of white noise on the displacement over that of the displacement (Section 5.4); its stream is
+        Mean square of white noise on each displacement over that of the displacement (Section 5.4); its streams are
         independent of the force's. Velocity and acceleration are then left out, as they were not measured.
     steps : int
         Steps a sample of the Adams-Bashforth-Moulton predictor-corrector (Section 2.2).
     initial : sequence of float
-        Displacement and velocity at the first sample.
+        Displacement of every coordinate at the first sample, then the velocities.
     name : str, optional
         Of the record; that of the model if left out.
 
     Raises
     ------
     StudyError
-        If a value is missing or the response does not stay finite.
+        If a value or a force is missing, or the response does not stay finite.
     """
+    names, seed, extra = [driving for driving, _ in model.equation.forces], 0, dict[str, Floats]()
+    start, units = 0.0, None
     if isinstance(force, Record):
-        values, dt, seed, start = force["force"], force.dt, 0, force.start
-        extra, units = {channel: force[channel] for channel in force.extra}, force.units
+        for driving in names:
+            expect(driving in force, f"{force.name} has no {driving!r}; expected every force of {model.name}")
+        forces, start, units = {driving: force[driving] for driving in names}, force.start, force.units
+        extra = {channel: force[channel] for channel in force.extra}
     else:
-        values, dt, seed, start, extra, units = force.values, force.dt, force.seed, 0.0, {}, None
+        several = "; expected a record with each of them"
+        expect(len(names) == 1, f"{model.name} has {len(names)} forces and one is given{several}")
+        forces, seed = {names[0]: force.values}, force.seed
     made = integrated(
-        model.equation, values, dt, Integrator(steps_per_sample=steps), initial=initial, start=start, extra=extra,
+        model.equation, forces, force.dt, Integrator(steps_per_sample=steps), initial=initial, start=start, extra=extra,
         units=units,
     )  # fmt: skip
-    channels: dict[str, Any] = dict(made.channels)
     if noise != 0.0:
-        channels["displacement"] = made["displacement"] + displacement_noise(made["displacement"], noise, seed)
-        del channels["velocity"], channels["acceleration"]
-    return Record(made.dt, channels, made.units, name or made.name, made.start)
+        measured = [sensor for sensor in made.sensors if sensor.motion == "displacement"]
+        added = {s: displacement_noise(made[s], noise, seed + number) for number, s in enumerate(measured)}
+        made = made.with_motions({s: made[s] + added[s] for s in measured})
+    return Record.of(replace(made, name=name or made.name))
 
 
 def _made(excitation: Excitation, samples: int, dt: float, seed: int) -> Force:

@@ -210,6 +210,7 @@ def identify(
         If there is no such estimator, it cannot work with this model or record, or no force acts.
     """
     given = records_of(record)
+    expect(not model.equation.named, "identify reads a single mass in reverse; expected Model.fit for a structure")
     expect(len(given) == 1, f"{len(given)} records are given; expected one, as frequency response functions are of one")
     equation, (driven,), _ = driven_alike(given, model.equation, absolute)
     expect(not driven.unforced, f"{driven.name}: no force acts; expected a driven record, or a fit of this one")

@@ -4,14 +4,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from study.equations.model import Model
+from study.equations.linear_part import connections
+from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify import estimators
 from study.identify.estimators.base import Identified, Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import displacement_noise, force
-from study.records.record import Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.reproduction.settings import IdentificationSettings, RecordSettings
 from study.support.config_files import checked
 from study.support.errors import DivergenceError, StudyError
@@ -24,11 +25,11 @@ def make_record(
     seed: int | None = None,
     noise_seed: int | None = None,
 ) -> Record:
-    """Simulate a case, noise on the displacement included.
+    """Simulate a case, noise on the displacements included.
 
-    Velocity and acceleration are the noise-free ones: Section 2.2 adds noise to u(t) alone. ``settings`` are those of
-    the case, as plain data too; the seeds take the place of the configured ones, for ensembles. A response that leaves
-    the range of finite numbers raises a ``DivergenceError``.
+    Velocity and acceleration are the noise-free ones: Section 2.2 adds noise to u(t) alone. Of ``sensors`` there is
+    the displacement alone. ``settings`` are those of the case, as plain data too; the seeds take the place of the
+    configured ones, for ensembles. A response that leaves the range of finite numbers raises a ``DivergenceError``.
     """
     settings = checked(RecordSettings, settings, "settings of a record")
     sampling, excitation = settings.sampling, settings.excitation.at_level(settings.level)
@@ -42,19 +43,31 @@ def make_record(
         return used
 
     values = force(excitation, sampling.samples, sampling.dt, stream(seed, settings.excitation.seed))
+    (driving, _), *_ = model.forces
     try:
-        record = simulate(model, values, sampling.dt, Integrator(**settings.integrator.model_dump()))
+        record = simulate(model, {driving: values}, sampling.dt, Integrator(**settings.integrator.model_dump()))
     except DivergenceError as error:
         raise DivergenceError(f"case {settings.case!r} at level {settings.level:g}: {error}", error.time) from None
-    if settings.noise > 0.0:
-        noise = displacement_noise(record["displacement"], settings.noise, stream(noise_seed, settings.noise_seed))
-        record = record.with_channels({"displacement": record["displacement"] + noise})
+    if settings.sensors:
+        record = record.with_motions({s: record[s] for s in (Sensor(c, MOTIONS[0]) for c in settings.sensors)})
+    measured = [s for s in record.sensors if s.motion == MOTIONS[0]] if settings.noise > 0.0 else []
+    for number, sensor in enumerate(measured):
+        own = stream(noise_seed, settings.noise_seed) + number
+        noise = displacement_noise(record[sensor], settings.noise, own)
+        record = record.with_channels({str(sensor): record[sensor] + noise})
     return replace(record, name=settings.case)
 
 
 def assumed_model(model: Model, also_assumed: str) -> Model:
-    """The model that the identification assumes: the case's own and, where the table says so, a term more."""
-    return model.with_term(get(also_assumed)) if also_assumed else model
+    """The model that the identification assumes: the case's own and, where the table says so, a term more.
+
+    It is assumed at every connection of the model that has none of its kind.
+    """
+    if not also_assumed:
+        return model
+    term, there = get(also_assumed), {t.place.path for t in model.terms if t.term.name == also_assumed}
+    tied = {t.place.path for t in model.terms if t.term.name != "inertia"} - there
+    return replace(model, terms=(*model.terms, *(free(term, p) for p in connections(model) if p.path in tied)))
 
 
 def estimator_settings(settings: IdentificationSettings) -> Settings:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -20,6 +20,7 @@ from study.identify.estimators import ESTIMATORS
 from study.identify.estimators.base import true_parameters
 from study.records.excitation import READINGS, SETTINGS, theoretical_autospectrum
 from study.reproduction.settings import (
+    CaseSettings,
     ExcitationSettings,
     IdentificationSettings,
     Positive,
@@ -46,15 +47,25 @@ LONGER, INPUTS = 4, 2  # the claims cut segments this many times as long too, an
 LINES = 4  # of a segment, that the fit band spans at least
 
 
-class Case(TableRow):
-    """One row of ``config/cases.tsv``; the numbers are those of the report's figures."""
+class SimulatedCase(TableRow):
+    """What a row of any table of cases says: a model under a force, and noise on what is measured."""
 
     case: Name
     model: Text
     excitation: Text
-    level: Positive
-    noise: Annotated[float, Field(ge=0.0, lt=1.0)]
-    also_assumed: str
+    level: Positive  # mean square of the force, N^2
+    noise: Annotated[float, Field(ge=0.0, lt=1.0)]  # mean square on each displacement over its own
+    also_assumed: str  # a term that the identification assumes wherever it is not
+    title: Text
+
+    @property
+    def model_file(self) -> str:
+        return f"models/{self.model}.yaml"
+
+
+class Case(SimulatedCase):
+    """One row of ``config/cases.tsv``; the numbers are those of the report's figures."""
+
     linear: Number
     nonlinear: Number
     coherence: Number
@@ -63,11 +74,6 @@ class Case(TableRow):
     autospectrum: Number
     force_history: Number
     force_histogram: Number
-    title: Text
-
-    @property
-    def model_file(self) -> str:
-        return f"models/{self.model}.yaml"
 
     @property
     def figures(self) -> dict[str, str]:
@@ -80,17 +86,16 @@ class Case(TableRow):
         }
 
 
+S = TypeVar("S", bound=CaseSettings[Any])
+C = TypeVar("C", bound=SimulatedCase)
+
+
 @dataclass(frozen=True)
-class StudyConfig:
+class Cases(Generic[S, C]):
     """Settings, and cases by name in the order of the table."""
 
-    settings: StudySettings
-    cases: Mapping[str, Case]
-
-    @property
-    def noise(self) -> dict[str, float]:
-        """Noise of each case: mean square on the displacement over that of the displacement."""
-        return {name: case.noise for name, case in self.cases.items()}
+    settings: S
+    cases: Mapping[str, C]
 
     def record_settings(self, case: str) -> RecordSettings:
         """What a case's record depends on; a job re-runs when it changes."""
@@ -112,6 +117,15 @@ class StudyConfig:
             period=shared.sampling.samples // periods if periods > 1 else None,
             relative={**tolerances.relative, **tolerances.of_case.get(case, {})}, absolute=tolerances.absolute,
         )  # fmt: skip
+
+
+class StudyConfig(Cases[StudySettings, Case]):
+    """The report's systems."""
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Noise of each case: mean square on the displacement over that of the displacement."""
+        return {name: case.noise for name, case in self.cases.items()}
 
     def drawn(self, case: str) -> list[str]:
         drawn = self.settings.drawn

@@ -1,7 +1,7 @@
 """The study's settings as typed, frozen values: the sections of ``config/config.yaml``, and what its jobs are given."""
 
 from difflib import get_close_matches
-from typing import Annotated, Literal
+from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, Field
 
@@ -113,12 +113,17 @@ class AllowedErrors(Section):
     absolute: Limits
 
 
-class Tolerances(AllowedErrors):
-    """Those of the study, and of single cases."""
+class CaseTolerances(AllowedErrors):
+    """Those of all cases, and what takes the place of the relative ones in single cases."""
+
+    of_case: dict[str, Limits] = Field(default_factory=dict[str, Limits])
+
+
+class Tolerances(CaseTolerances):
+    """Those of the report's systems."""
 
     relative: Annotated[Limits, _with("m", "f_n", "k", "k3", "k_m", "k_dead_band", "u_g", "f_m", "c3", "c", "zeta")]
     absolute: Annotated[Limits, _with("k", "c", "k3", "phase")]
-    of_case: dict[str, Limits] = Field(default_factory=dict[str, Limits])
 
 
 class Ensembles(Section):
@@ -175,8 +180,11 @@ class Trials(TrialSettings):
     wanted: Wanted
 
 
-class StudySettings(Section):
-    """``config/config.yaml``; the comments there say what each section is for."""
+T = TypeVar("T", bound=CaseTolerances)
+
+
+class CaseSettings(Section, Generic[T]):
+    """What the cases of a table share: how their records are made, and what is found in them."""
 
     sampling: Sampling
     excitations: Annotated[dict[str, ExcitationSettings], Field(min_length=1)]
@@ -185,10 +193,15 @@ class StudySettings(Section):
     segments: SegmentSettings
     fit_band: Band
     local_polynomial: LocalPolynomialSettings
-    settle_periods: Seed
+    settle_periods: Seed = 0  # of a force that repeats
     estimators: Names
+    tolerances: T
+
+
+class StudySettings(CaseSettings[Tolerances]):
+    """``config/config.yaml``; the comments there say what each section is for."""
+
     drawn: DrawnEstimators
-    tolerances: Tolerances
     monte_carlo: MonteCarlo
     estimator_errors: EstimatorErrors
     ensembles: Ensembles
@@ -222,7 +235,10 @@ class ClaimSettings(Section):
 
 
 class RecordSettings(Section):
-    """What a case's record depends on; its seeds are left out where a job brings its own."""
+    """What a case's record depends on; its seeds are left out where a job brings its own.
+
+    ``sensors`` are the coordinates of which the displacement alone is measured; all motions where they are left out.
+    """
 
     case: str
     excitation: ExcitationSettings
@@ -231,6 +247,7 @@ class RecordSettings(Section):
     noise_seed: Seed | None = None
     sampling: Sampling
     integrator: IntegratorSettings
+    sensors: Names | None = None
 
     def without_seeds(self) -> "RecordSettings":
         """The same for a job that brings seeds of its own: it does not re-run when those of the study change."""

@@ -18,7 +18,8 @@ from study.identify.frequency_domain.reverse_system import exact_responses
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition, verdict
-from study.reproduction.structure_cases import CaseResult, StructureCase, StructureSettings
+from study.reproduction.settings import IdentificationSettings
+from study.reproduction.structure_cases import CaseResult, ClaimLimits
 from study.reproduction.tables import (
     COHERENCE_COLUMNS,
     PARAMETER_COLUMNS,
@@ -54,14 +55,14 @@ def input_place(item: Input) -> str:
     return " and ".join(dict.fromkeys(labels))
 
 
-def structure_parameters(case: str, result: CaseResult, settings: StructureSettings) -> pd.DataFrame:
+def structure_parameters(result: CaseResult, settings: IdentificationSettings) -> pd.DataFrame:
     """Every coefficient of every estimator from all equations together, one row each."""
     rows: list[tuple[Any, ...]] = []
     for estimator, found in result.found.items():
         for key in found.joint.estimate.symbols:
-            true, value = result.model.values[key] or 0.0, found.joint.estimate[key]
-            judged = judge_estimate(key[: key.index("[")], true, value, settings.tolerances).values()
-            rows.append((case, estimator, key, true, value, found.joint.estimate.error(key), *judged, ""))
+            true, value = result.model.numbers()[key], found.joint.estimate[key]
+            judged = judge_estimate(key[: key.index("[")], true, value, settings).values()
+            rows.append((settings.case, estimator, key, true, value, found.joint.estimate.error(key), *judged, ""))
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
@@ -77,8 +78,7 @@ def structure_reactions(case: str, result: CaseResult) -> pd.DataFrame:
 
 def structure_responses(result: CaseResult) -> pd.DataFrame:
     """A_j(f) of every equation and estimator with its standard error and the exact function, in long form."""
-    values = {key: value for key, value in result.model.values.items() if value is not None}
-    parts: list[Sequence[Any]] = []
+    values, parts = result.model.numbers(), list[Sequence[Any]]()
     for estimator, found in result.found.items():
         for own in found.system.results:
             responses, scale = own.found.responses, 1.0 if own.mass is None else values[own.mass]
@@ -115,19 +115,16 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
     return stacked([*WHERE, *COHERENCE_COLUMNS], parts)
 
 
-# ---- the linear part as measured
+# ---- by modes
 
 
-def modal_parameters(
-    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
-) -> pd.DataFrame:  # fmt: skip
+def modal_parameters(truth: Model, comparison: Comparison, settings: IdentificationSettings) -> pd.DataFrame:
     """Coefficients with their tolerance, then natural frequencies and damping ratios beside the exact ones."""
-    modes, exact = comparison.modes, modes_of(truth)
-    allowed, rows = settings.tolerances.measured.coefficient, list[tuple[Any, ...]]()
+    modes, exact, rows = comparison.modes, modes_of(truth), list[tuple[Any, ...]]()
     for found in comparison.coefficients:
         key, value, true = found.key, found.value, truth.numbers()[found.key]
-        off = value / true - 1.0
-        rows.append((case.case, BY_MODES, key, true, value, found.error or 0.0, off, allowed, abs(off) <= allowed, ""))
+        judged = judge_estimate(key[: key.index("[")], true, value, settings).values()
+        rows.append((settings.case, BY_MODES, key, true, value, found.error or 0.0, *judged, ""))
     for r, frequency in enumerate(modes.frequency.tolist()):
         k = int(np.argmin(np.abs(exact.frequency - frequency)))
         for name, true, value, error in (
@@ -136,14 +133,17 @@ def modal_parameters(
         ):
             off = float(value / true) - 1.0
             told = (float(true), float(value), float(error), off)
-            rows.append((case.case, BY_MODES, f"{name}[{k + 1}]", *told, np.nan, "", ""))
+            rows.append((settings.case, BY_MODES, f"{name}[{k + 1}]", *told, np.nan, "", ""))
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
 def modal_responses(
-    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
-) -> pd.DataFrame:  # fmt: skip
-    """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones."""
+    truth: Model, comparison: Comparison, settings: IdentificationSettings, highest: float
+) -> pd.DataFrame:
+    """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones.
+
+    ``highest`` is the frequency in Hz up to which the structure is driven.
+    """
     parts: list[tuple[Any, ...]] = []
     units = {
         key: t.term.unit(s, "N", "m") for t in truth.terms for key, s in zip(t.symbols, t.term.symbols, strict=True)
@@ -159,7 +159,7 @@ def modal_responses(
     places = [s.coordinate for s in prepared.sensors]
     cut, fitted = settings.segments.segments(), comparison.fit.model
     f, found, exact = transfer_functions(truth, prepared.record[name], prepared.measured.T, places, prepared.dt, cut)
-    inside = (f > 0.0) & (f < case.cutoff - LEAKED * f[1])
+    inside = (f > 0.0) & (f < highest - LEAKED * f[1])
     sensors = [Sensor(place, MOTIONS[0]) for place in places]
     modal = transfer(fitted, sensors, prepared.dt, cut.length)[:, :, fitted.coordinates.index(where)]
     for k, place in enumerate(places):
@@ -190,45 +190,50 @@ def transfer_functions(
 
 
 def structure_claims(
-    case: StructureCase, record: Record, result: CaseResult, settings: StructureSettings
+    record: Record, result: CaseResult, settings: IdentificationSettings, limits: ClaimLimits
 ) -> pd.DataFrame:
     """Every claim on a case, a row each: what must hold, what was measured, the verdict."""
     return _judged(
-        case,
-        transfer_functions=_changed(result.model, record, settings),
-        placed=_placed(case, result, settings),
-        reaction=_reaction(result, settings),
+        settings.case,
+        transfer_functions=_changed(result.model, record, settings, limits.changed),
+        placed=_placed(structure_parameters(result, settings), "miso"),
+        reaction=_reaction(result, limits.by_chance),
     )
 
 
 def modal_claims(
-    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
+    truth: Model, comparison: Comparison, settings: IdentificationSettings, limits: ClaimLimits, noise: float
 ) -> pd.DataFrame:
-    """The same of a case whose linear part is as measured."""
-    return _judged(case, measured=_modal(case, truth, comparison, settings))
+    """The same of a case whose linear part is a sum of modes; ``noise`` is the mean square on the response."""
+    found = modal_parameters(truth, comparison, settings)
+    coefficients = found[found["parameter"].isin(c.key for c in comparison.coefficients)]
+    least, error = float(np.sqrt(noise / (1.0 + noise))), comparison.prediction.error
+    criterion = f"error of the free run at most {limits.error:g} times the noise of {percent(least)}"
+    runs_free = Condition(criterion, f"error {percent(error)}", error <= limits.error * least)
+    return _judged(settings.case, measured=[*_placed(coefficients, BY_MODES), runs_free])
 
 
-def _judged(case: StructureCase, **claims: Iterable[Condition]) -> pd.DataFrame:
+def _judged(case: str, **claims: Iterable[Condition]) -> pd.DataFrame:
     """The claims of ``STATEMENTS`` with their conditions."""
     rows: list[dict[str, str]] = []
     for name, conditions in claims.items():
         held = list(conditions)
         rows.append({
-            "case": case.case, "claim": STATEMENTS[name], "criterion": SEPARATOR.join(c.criterion for c in held),
+            "case": case, "claim": STATEMENTS[name], "criterion": SEPARATOR.join(c.criterion for c in held),
             "measured": SEPARATOR.join(c.measured for c in held),
             "verdict": verdict([c.met for c in held], ("holds", "partly", "does not hold")),
         })  # fmt: skip
     return pd.DataFrame(rows)
 
 
-def _changed(model: Model, record: Record, settings: StructureSettings) -> Iterable[Condition]:
+def _changed(model: Model, record: Record, settings: IdentificationSettings, limit: float) -> Iterable[Condition]:
     """The best linear approximation of every motion by the force against that of the structure's linear part."""
     (name, _), *_ = model.forces
     motions = [record[Sensor(c, MOTIONS[0])] for c in model.coordinates]
     f, found, exact = transfer_functions(
         model, record[name], motions, model.coordinates, record.dt, settings.segments.segments()
     )
-    inside, limit = (f >= settings.fit_band[0]) & (f <= settings.fit_band[1]), settings.claims.changed
+    inside = (f >= settings.fit_band[0]) & (f <= settings.fit_band[1])
     power = np.sum(np.abs(exact[inside]) ** 2, axis=0)
     off = np.sqrt(np.sum(np.abs(found[inside] - exact[inside]) ** 2, axis=0) / power)
     for place, share in zip(model.coordinates, off.tolist(), strict=True):
@@ -238,9 +243,9 @@ def _changed(model: Model, record: Record, settings: StructureSettings) -> Itera
         )  # fmt: skip
 
 
-def _placed(case: StructureCase, result: CaseResult, settings: StructureSettings) -> Iterable[Condition]:
-    table = structure_parameters(case.case, result, settings)
-    for _, row in table[table["estimator"] == "miso"].iterrows():
+def _placed(table: pd.DataFrame, estimator: str) -> Iterable[Condition]:
+    """Whether an estimator has every coefficient of a table of parameters within its tolerance."""
+    for _, row in table[table["estimator"] == estimator].iterrows():
         true, value, allowed = (float(row[name]) for name in ("true", "estimate", "tolerance"))
         criterion = f"within {percent(allowed)} of {true:.6g}" if true else f"within +-{allowed:g} of zero"
         measured = percent(value / true - 1.0, "+.2g") if true else f"{value:+.2g}"
@@ -248,28 +253,10 @@ def _placed(case: StructureCase, result: CaseResult, settings: StructureSettings
         yield Condition(f"{key} {criterion}", f"{key} {measured}", met)
 
 
-def _reaction(result: CaseResult, settings: StructureSettings) -> Iterable[Condition]:
-    limit = settings.claims.by_chance
+def _reaction(result: CaseResult, limit: float) -> Iterable[Condition]:
     for name, label, sign in (("miso", "MI/SO", "at least"), ("siso", "SI/SO", "below")):
         p = result.found[name].joint.least_p
         yield Condition(
             f"{label}: probability that chance makes the largest difference {sign} {limit:g}", f"{label} {p:.2g}",
             (p >= limit) == (name == "miso"),
         )  # fmt: skip
-
-
-def _modal(
-    case: StructureCase, truth: Model, comparison: Comparison, settings: StructureSettings
-) -> Iterable[Condition]:
-    allowed = settings.tolerances.measured
-    for found in comparison.coefficients:
-        key, true = found.key, truth.numbers()[found.key]
-        off = found.value / true - 1.0
-        met = abs(off) <= allowed.coefficient
-        yield Condition(
-            f"{key} within {percent(allowed.coefficient)} of {true:.6g}", f"{key} {percent(off, '+.2g')}", met
-        )
-    noise = float(np.sqrt(case.noise / (1.0 + case.noise)))
-    error = comparison.prediction.error
-    criterion = f"error of the free run at most {allowed.error:g} times the noise of {percent(noise)}"
-    yield Condition(criterion, f"error {percent(error)}", error <= allowed.error * noise)

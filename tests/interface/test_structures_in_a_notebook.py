@@ -92,5 +92,23 @@ def test_what_does_not_go_is_said_in_a_sentence(fit):
         pair(st.term("cubic_stiffness", between=("a", "c")))
     with pytest.raises(StudyError, match="single mass"):
         fit.plot_frf()
-    with pytest.raises(StudyError, match="study simulate"):
-        fit.predict(np.zeros(100))
+    with pytest.raises(StudyError, match="identify reads a single mass in reverse"):
+        st.identify(st.Record.of(fit.comparison.record), fit.given)
+    with pytest.raises(StudyError, match="has no 'shaker'; expected every force of pair"):
+        fit.predict(st.record({"force": np.arange(99.0) ** 2, "displacement": np.arange(99.0)}, dt=DT))
+
+
+def test_a_structure_is_simulated_and_its_fit_predicts(fit):
+    added = fit.add("cubic_stiffness", between=("a", "b"))
+    record = st.Record.of(fit.comparison.record)
+    drive = st.Force(record["shaker"], DT, seed=3)
+    made, by_name = st.simulate(added.model, drive), added.predict(record)
+    assert {"a displacement", "b velocity"} <= set(made.channels)
+    assert made["b displacement"] == pytest.approx(by_name["b displacement"])
+    assert np.std(made["b displacement"] - record["b displacement"]) < 0.02 * np.std(record["b displacement"])
+    noisy = st.simulate(added.model, drive, noise=0.01)
+    assert [str(s) for s in noisy.sensors] == ["a displacement", "b displacement"]
+    added_noise = [noisy[str(s)] - made[str(s)] for s in noisy.sensors]
+    assert abs(np.corrcoef(added_noise)[0, 1]) < 0.1
+    assert "shaker" in record.plot_spectrum().get_ylabel()
+    plt.close("all")

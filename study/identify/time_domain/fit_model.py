@@ -135,8 +135,9 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     The steady motion has the same error for any mass and the stiffness to it; what little is left (rounding, a force
     between its samples) chooses one of them, with a standard error that means nothing.
     """
-    # another fit begins a fifth heavier, and is to come back
-    heavier = _along_steady(fit.model.numbers(), omega, 1.2)
+    # another fit begins a fifth heavier, with the stiffness of the same steady motion, and is to come back
+    values = fit.model.numbers()
+    heavier = values | {"m": 1.2 * values["m"], "k": values["k"] + (1.2 - 1.0) * values["m"] * omega**2}
     again = _tried(fit.model.with_values(heavier), prepared, fit.held, heavier, KEPT)
     if fit.restarts or again is None or not (fit.converged and again.converged):
         return False
@@ -144,11 +145,6 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     own, other = (f.model.numbers()["m"] for f in (fit, again))
     known = np.sqrt([covariance_of(f, linearise(f, prepared))[place, place] for f in (fit, again)])
     return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME * own
-
-
-def _along_steady(values: Values, omega: float, times: float) -> dict[str, float]:
-    """Another mass, with the stiffness that gives the same steady motion at one frequency."""
-    return dict(values) | {"m": times * values["m"], "k": values["k"] + (times - 1.0) * values["m"] * omega**2}
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:

@@ -9,7 +9,7 @@ from scipy.fft import rfft
 
 from study.equations.linear_part import acting
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import Input, along, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import along, histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import fit_in_segments
 from study.identify.time_domain.stretch_states import is_smooth, resembles_a_motion
@@ -106,7 +106,10 @@ def _unit_forces(model: Model, part: Record) -> dict[str, Floats]:
             (shape,) = histories((item,), motion)
             for place in item.parts:
                 added = forces.setdefault(place.symbol, np.zeros((len(part), len(model.coordinates))))
-                added[:, i] += place.factor * _of_order(item, shape, place.order, motion)
+                # the derivatives of the displacement are channels of a prepared record
+                known = item.shape == "u"
+                force = motion[MOTIONS[place.order]] if known else derivative(shape, motion.dt, place.order)
+                added[:, i] += place.factor * force
     return forces
 
 
@@ -131,8 +134,3 @@ def _as_power(forces: Floats, model: Model, part: Record) -> Complexes:
     passed = 1.0 + (lines / float(np.average(lines, weights=work))) ** 2
     speed = np.std(velocity, axis=0)
     return spectra * (speed / np.max(speed))[:, None] / (passed**2)[:, None, None]
-
-
-def _of_order(item: Input, shape: Floats, order: int, motion: Record) -> Floats:
-    """The shape's derivative; those of the displacement are channels of a prepared record."""
-    return motion[MOTIONS[order]] if item.shape == "u" else derivative(shape, motion.dt, order)
