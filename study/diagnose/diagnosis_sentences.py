@@ -30,7 +30,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
         case verdict.SEVERAL | verdict.PARTLY_KNOWN:
             said = _several(diagnosis, diagnosis.sets[0])
         case _:
-            said = _unknown(diagnosis)
+            said = [_misses_much(diagnosis)] if diagnosis.misses_much else _unknown(diagnosis)
     if diagnosis.ended_at is not None:
         said.append(f"The search was ended by hand at sets of {diagnosis.ended_at}: what is said is the best so far.")
     if diagnosis.answer is not None:
@@ -40,28 +40,27 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def misses_much(diagnosis: Diagnosis, much: float = 0.1) -> bool:
-    """Whether a model of which no effect is missing leaves far more than noise, so much of the rms response."""
-    return diagnosis.verdict == NOTHING and diagnosis.comparison.prediction.above_noise > much
-
-
 def _nothing(diagnosis: Diagnosis) -> str:
-    comparison = diagnosis.comparison
-    where = " at any place" if comparison.model.named else ""
-    asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
-    if misses_much(diagnosis):
-        prediction = comparison.prediction
-        return (
-            f"No known effect is missing, but the model does not describe this record: the error of "
-            f"{_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
-            f"{percent(prediction.floor)}. None of {asked} explains any of it. Other modes may show, or a force that "
-            "was not measured: --near and --up-to choose one mode, 'linear: modal' in the model file takes several."
-        )
+    where = " at any place" if diagnosis.comparison.model.named else ""
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
-        f"{percent(comparison.prediction.error)}, and what is left looks like noise: it depends neither on the motion"
-        f"{where}, nor on its past, nor on time. None of {asked} explains any of it."
+        f"{percent(diagnosis.comparison.prediction.error)}, and what is left looks like noise: it depends neither on "
+        f"the motion{where}, nor on its past, nor on time. None of {_all_asked(diagnosis)} explains any of it."
     )
+
+
+def _misses_much(diagnosis: Diagnosis) -> str:
+    prediction = diagnosis.comparison.prediction
+    return (
+        f"No known effect is missing, but the model does not describe this record: the error of "
+        f"{_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
+        f"{percent(prediction.floor)}. None of {_all_asked(diagnosis)} explains it. Other modes may show, or a force "
+        "that was not measured: --near and --up-to choose one mode, 'linear: modal' in the model file takes several."
+    )
+
+
+def _all_asked(diagnosis: Diagnosis) -> str:
+    return f"{diagnosis.asked} {'effects and places' if diagnosis.comparison.model.named else 'candidates'}"
 
 
 def _response(diagnosis: Diagnosis) -> str:

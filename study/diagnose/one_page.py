@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.adding import added_candidate
 from study.diagnose.diagnosis_files import all_names, choices_in_words, diagnosis_in_words
-from study.diagnose.diagnosis_sentences import digits_between, effect_in_words, misses_much
+from study.diagnose.diagnosis_sentences import digits_between, effect_in_words
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
@@ -55,7 +55,7 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
     if diagnosis.verdict == "partly_known":
         effects += " is" if one else " are"
     headline = HEADLINES[diagnosis.verdict].format(effects=effects)
-    if misses_much(diagnosis):
+    if diagnosis.misses_much:
         headline = (
             f"No known effect is missing, but the model misses {percent(before.prediction.error)} of the response"
         )

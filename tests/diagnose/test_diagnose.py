@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from study import trials
 from study.compare.comparison import compare
@@ -90,7 +91,17 @@ def test_nothing_missing_is_said_where_nothing_is():
 
 
 def test_a_model_that_misses_much_is_not_called_complete_where_nothing_is_found(of_drag):
-    said = diagnosis_sentences(replace(of_drag, verdict=NOTHING))[0]
+    """What a mode at another frequency shows of a force that nobody measured depends on nothing that is there."""
+    trial = trials.make_trial(901, hidden=[], noise=0.01, response="displacement")
+    motion, rate = trial.record["displacement"], 1.0 / trial.record.dt
+    another = sosfilt(butter(2, (0.3 * rate, 0.32 * rate), "bandpass", fs=rate, output="sos"),
+                      np.random.default_rng(1).standard_normal(len(motion)))  # fmt: skip
+    record = trial.record.with_channels({"displacement": motion + 0.5 * np.std(motion) / np.std(another) * another})
+    found = diagnosed(trial.believed, record)
+    assert (found.verdict, found.answer, found.misses_much) == (UNKNOWN, None, True)
+    assert diagnosis_sentences(found)[0].startswith("No known effect is missing, but the model does not describe")
+
+    said = diagnosis_sentences(replace(of_drag, verdict=UNKNOWN, left=0.0))[0]
     assert of_drag.comparison.prediction.above_noise > 0.1
     assert "does not describe this record" in said
     assert "Nothing is missing" not in said
