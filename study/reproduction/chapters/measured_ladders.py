@@ -115,14 +115,15 @@ def ladders_figure(tables: Tables) -> Figure:
         panel.set_ylabel("error (%)")
     if not records:
         axes[0].text(0.0, 0.5, "left out: the data are not there", transform=axes[0].transAxes)
-    page.letter(axes[: len(records)], [r.replace("_", " ") for r in records])
+    titles = dict(zip(rows["record"], rows["title"], strict=True))
+    page.letter(axes[: len(records)], [str(titles[record]) for record in records])
     return figure
 
 
 def told_measured(tables: Tables) -> list[Block]:
     """Every ladder beside what the literature reaches."""
     rows = [
-        [str(r["record"]).replace("_", " "), f"+ {term_names(str(r['added']))}" if r["step"] else "as given",
+        [str(r["title"]), f"+ {term_names(str(r['added']))}" if r["step"] else "as given",
          percent(r["error"]), f"{r['rms']:.3g} {r['unit']}", percent(r["floor"]),
          str(r["published"]) if not r["step"] else ""]
         for _, r in _there(tables).iterrows()
