@@ -51,9 +51,8 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
 def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
     """Errors of every step on the judged samples: relative, in the response's unit, and the noise floor.
 
-    The faults that the ladder names are corrected as the first model has them; a climb looks for all, which takes half of
-    its time and of a model that lacks most finds little but that. A step whose model cannot be fitted has the reason as
-    its note.
+    The faults that the ladder names are corrected as the first model has them. A climb looks for all of them, which
+    takes as long as the ladder. A step whose model cannot be fitted has the reason as its note.
     """
     options = _with_fit(row.options, ladder.fit)
     model = read_model(Path(row.model))
