@@ -57,14 +57,6 @@ def assumed_model(model: Model, also_assumed: str) -> Model:
     return model.with_term(get(also_assumed)) if also_assumed else model
 
 
-def begun_at_truth(model: Model) -> Model:
-    """The model with all coefficients open, a fit in free run beginning at those it has.
-
-    For ensembles that ask where a fit ends: a search from nothing ends at the same minimum after half as long again.
-    """
-    return replace(model, terms=tuple(entry.opened() for entry in model.terms))
-
-
 def estimator_settings(settings: IdentificationSettings) -> Settings:
     """What the estimators themselves are told."""
     low, high = settings.fit_band

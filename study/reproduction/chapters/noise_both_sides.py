@@ -36,7 +36,7 @@ from study.identify.frequency_domain.inputs import reverse_inputs
 from study.identify.frequency_domain.noisy_inputs import expected_spectra
 from study.records.excitation import displacement_noise, theoretical_autospectrum
 from study.records.record import Record
-from study.reproduction.cases import begun_at_truth, make_record
+from study.reproduction.cases import make_record
 from study.reproduction.chapters.chapter import (
     Chapter,
     NoiseSettings,
@@ -72,7 +72,7 @@ def make_noise(study: ClaimSettings, own: NoiseSettings, models: Path) -> Tables
     pair of levels.
     """
     model = read_model(models / f"{own.system}.yaml")
-    begun = begun_at_truth(model)
+    begun = replace(model, terms=tuple(entry.opened() for entry in model.terms))
     rows: list[dict[str, Any]] = []
     for force, used in ((RANDOM, own.estimators), (PERIODIC_FORCE, own.periodic_estimators)):
         for seed in range(own.first_seed, own.first_seed + own.seeds):

@@ -9,7 +9,6 @@ import numpy as np
 from study.equations.simulate import Integrator, simulate
 from study.identify.estimators.in_free_run import instrumental
 from study.records.excitation import Excitation, displacement_noise, force, theoretical_autospectrum
-from study.reproduction.cases import begun_at_truth
 from study.reproduction.claims.conditions import recovered
 from study.reproduction.claims.evidence import Analysis, Assumed, Drive, Ensemble, Evidence, Outcome
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together, within_share
@@ -233,7 +232,7 @@ def small(name: str, bias: Sample, most: float) -> Condition:
 def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dict[str, Sample]:
     """Relative error of each parameter against its exact value."""
     drive, settings = Drive(COMBINED, noise=noise), evidence.estimator_settings()
-    model, truth = begun_at_truth(evidence.model(drive)), {n: reported.table_1(COMBINED, n) for n in (*PARTS, "f_n")}
+    model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*PARTS, "f_n")}
     identified = threaded(lambda r: instrumental(model, r, settings), evidence.records(drive))
     estimates = [{p.name: p.value for p in i.parameters} for i in identified]
     return {n: Sample.own_first(e[n] / true - 1.0 for e in estimates) for n, true in truth.items()}
