@@ -115,16 +115,14 @@ def diagnose(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
-    own, tried, elsewhere = comparison.fit.model.terms, list[FittedCandidate](), 0
+    own, elsewhere = comparison.fit.model.terms, 0
+    tried = candidates.try_all(entries, base, progress)
     changes = promised_changes(comparison.fit, comparison.prepared, own)
-    if changes is None or not changes.alone:
-        tried = candidates.try_all(entries, base, progress)
-    if changes is not None and (changes.alone or varying_candidates.beside(tried, changes, comparison)):
+    if changes is not None and varying_candidates.first_of_all(tried, changes, comparison):
         other = _changing(changes, comparison, base, tried, entries, progress)
         if other is not None and other.changes:
             return other  # else nothing that is named changes, and the record is judged as it was
         elsewhere = 0 if other is None else len(changes.shares)
-    tried = tried or candidates.try_all(entries, base, progress)
     if (freed := _freed(comparison, base, tried)) is not None:
         return diagnose(freed, extra=extra, without=without, progress=progress)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
@@ -134,7 +132,9 @@ def diagnose(
         return found
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
-    other = None if changes is None else _changing(changes, comparison, base, tried, entries, progress, beside=True)
+    if changes is None or not varying_candidates.explains_more(changes, named[0].names):
+        return found
+    other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     return found if other is None or not other.changes else other
 
 

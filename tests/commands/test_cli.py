@@ -383,3 +383,11 @@ def test_a_word_finds_terms_by_name_or_by_what_they_mean(capsys: pytest.CaptureF
     assert capsys.readouterr().out.startswith("dead_band: ")
     assert cli.main(["terms", "bolted"]) == 0
     assert "hysteresis" in capsys.readouterr().out
+
+
+def test_fits_side_by_side_are_not_each_run_by_threads_of_their_own():
+    asked = "import os, sys, study.cli; study.cli.main(['--version']); print(os.environ['OPENBLAS_NUM_THREADS'])"
+    free = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    for given, expected in ((free, "1"), (free | {"OPENBLAS_NUM_THREADS": "3"}, "3")):
+        run = subprocess.run([sys.executable, "-c", asked], env=given, capture_output=True, text=True, check=True)
+        assert run.stdout.splitlines()[-1] == expected
