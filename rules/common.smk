@@ -48,10 +48,6 @@ def ensemble_settings(wildcards):
     return STUDY.record_settings(wildcards.case).without_seeds().plain()
 
 
-def identification_settings(wildcards):
-    return STUDY.identification_settings(wildcards.case).plain()
-
-
 def monte_carlo_settings(wildcards):
     return [STUDY.identification_settings(wildcards.case, STUDY.settings.monte_carlo.estimators).plain()]
 

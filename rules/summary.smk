@@ -1,5 +1,5 @@
 # What all cases give together: one table of parameters, and the pages, of which a reader opens results/summary.md first.
-BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "identify", "draw") for case in STUDY.cases]
+BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "identify") for case in STUDY.cases]
 BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims", "estimator_errors")]
 # Tables that are pages of the workflow's report as they stand.
 TABLE_PAGES = {

@@ -9,14 +9,17 @@ from pydantic import BeforeValidator
 
 from study.commands.measurements import Measurement
 from study.commands.parser import parser
-from study.commands.record_arguments import accounted_together, read_records
+from study.commands.record_arguments import layout_of, read_records
 from study.compare.comparison import Comparison, compare
 from study.equations.model import free
 from study.equations.model_file import read_model
 from study.equations.terms import get
+from study.faults.fault import FAULTS, settings_of
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
+from study.way_in.compare_records import compare_records
 
+Words = Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]
 COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
 
 
@@ -24,8 +27,9 @@ class Ladder(TableRow):
     """A row of ``config/ladders.tsv``."""
 
     record: Text  # of ``config/measurements.tsv``
-    terms: Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]  # one by one
+    terms: Words  # that are added, one by one
     fit: str  # samples that are fitted, in the words of the command line, where a part of those of the row is enough
+    faults: Words  # of the measurement, that are looked for and corrected
     published: Text  # what the literature reaches or knows
 
 
@@ -39,6 +43,7 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
             expect(row.record not in found, "the record stands twice; expected each once")
             for name in row.terms:
                 get(name)
+            settings_of(dict.fromkeys(row.faults))
         found[row.record] = row
     return found
 
@@ -46,8 +51,8 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
 def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
     """Errors of every step on the judged samples: relative, in the response's unit, and the noise floor.
 
-    Faults of the measurement are corrected as the first model has them, as a climb begins. A step whose model cannot be
-    fitted has the reason as its note.
+    The faults that the ladder names are corrected as the first model has them. A climb looks for all of them, which
+    takes as long as the ladder. A step whose model cannot be fitted has the reason as its note.
     """
     options = list(row.options)
     if ladder.fit:
@@ -55,6 +60,8 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     model = read_model(Path(row.model))
     arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
+    layout = layout_of(arguments, records[0])
+    settings = settings_of({name: None for name in FAULTS if name not in ladder.faults})
     found: Comparison | None = None
     for step in range(len(ladder.terms) + 1):
         if step:
@@ -65,7 +72,7 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
         }  # fmt: skip
         try:
             found = (
-                accounted_together(arguments, model, records, Path(row.paths[0])).comparison
+                compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
                 if found is None else compare(model, found.prepared)
             )  # fmt: skip
         except StudyError as error:

@@ -119,8 +119,8 @@ def estimated(parameters: "pd.DataFrame") -> str:
 
 
 def term_names(text: str) -> str:
-    """Names of terms in words: ``van_der_pol_damping`` becomes ``Van der Pol damping``."""
+    """Names of terms or systems in words: ``van_der_pol_damping`` becomes ``Van der Pol damping``."""
     words = text.replace("_", " ")
-    for name in ("Van der Pol", "Coulomb", "Stribeck"):
+    for name in ("Van der Pol", "Coulomb", "Stribeck", "Duffing", "Mathieu"):
         words = words.replace(name.lower(), name)
     return words

@@ -310,6 +310,6 @@ def _error_panel(panel: Axes, table: pd.DataFrame, cases: Sequence[str]) -> None
     panel.xaxis.set_major_locator(LogLocator(base=10.0, numticks=20))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.set_xticks([10.0**power for power in range(-6, 3, 2)])
-    panel.set_yticks(range(len(cases)), [case.replace("_", " ") for case in cases])
+    panel.set_yticks(range(len(cases)), [labels.term_names(case) for case in cases])
     panel.set_ylim(len(cases) - 0.4, -0.6)
     panel.grid(visible=False, axis="y")

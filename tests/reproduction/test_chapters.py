@@ -183,9 +183,10 @@ def test_a_record_that_is_not_there_is_left_out_and_said_so(expected, monkeypatc
 
 def test_ladders_name_records_and_terms_that_there_are(tmp_path):
     rows = load_measurements(CONFIG)
-    head = "record\tterms\tfit\tpublished\n"
-    for row, named in (("nobody\tcubic_stiffness\t\tx", "nobody"), ("silverbox\tno_term\t\tx", "no_term")):
-        (tmp_path / "ladders.tsv").write_text(f"{head}{row}\n")
+    head = "record\tterms\tfit\tfaults\tpublished\n"
+    wrong = ("nobody\tcubic_stiffness\t\t", "silverbox\tno_term\t\t", "silverbox\tcubic_stiffness\t\tno_fault")
+    for row, named in zip(wrong, ("nobody", "no_term", "no_fault"), strict=True):
+        (tmp_path / "ladders.tsv").write_text(f"{head}{row}\tx\n")
         with pytest.raises(StudyError, match=named):
             load_ladders(tmp_path, rows)
 

@@ -26,7 +26,7 @@ def test_names_that_are_taken(folder, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["draw.duffing", "compare.silverbox", "claims.csv", "summary.md", "v_.2", "v2.", "a" * 65, "a" * 300]
+    "name", ["identify.duffing", "compare.silverbox", "claims.csv", "summary.md", "v_.2", "v2.", "a" * 65, "a" * 300]
 )
 def test_names_that_no_file_or_rule_may_have(folder, name):
     spoil(folder / "cases.tsv", "\nduffing\t", f"\n{name}\t")

@@ -120,7 +120,7 @@ def test_snakemake_looks_for_work_when_a_job_ends_not_all_the_time(built):
 def test_a_new_row_runs_its_own_jobs_and_what_joins_all_cases(built):
     with edited(built / "config" / "cases.tsv", DUFFING, f"{DUFFING}\nmine\tlinear\treport\t2\t0{10 * TAB}Mine"):
         assert planned(built) == {
-            "record": 1, "identify": 1, "draw.mine": 1, "estimator_errors": 1, "draw_estimators": 1, "parameters": 1,
+            "record": 1, "identify.mine": 1, "estimator_errors": 1, "draw_estimators": 1, "parameters": 1,
             "summary": 1, "part1": 1,
         }  # fmt: skip
 
@@ -152,16 +152,15 @@ def test_touched_identification_runs_again_without_simulation(built):
     module.touch()
     jobs = planned(built)
     os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))
-    assert jobs["identify"] == 2
-    assert {"draw.duffing", "draw.noisy", "claims", "parameters", "summary"} <= set(jobs)
+    assert {"identify.duffing", "identify.noisy", "claims", "parameters", "summary"} <= set(jobs)
     assert "record" not in jobs
 
 
-def test_touched_style_draws_again_and_nothing_else(built):
+def test_touched_style_draws_again_without_simulation_or_claims(built):
     with edited(built / "study" / "figures" / "study.mplstyle", "font.size: 10", "font.size: 11"):
         jobs = planned(built)
     assert set(jobs) == {
-        "draw.duffing", "draw.noisy", "draw_estimators", "summary", "part1",
+        "identify.duffing", "identify.noisy", "draw_estimators", "parameters", "summary", "part1",
         *(f"structure.{case}" for case in STRUCTURES), "structures", "structure_claims",
     }  # fmt: skip
 
@@ -173,10 +172,8 @@ def test_touched_style_draws_again_and_nothing_else(built):
 def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
     with edited(built / "config" / file, old, new):
         jobs = planned(built)
-    assert {name: jobs[name] for name in ("record", "identify", "draw.noisy")} == {
-        "record": 1, "identify": 1, "draw.noisy": 1
-    }  # fmt: skip
-    assert not {"draw.duffing", "claims", "excitation_reading"} & set(jobs)
+    assert (jobs["record"], jobs["identify.noisy"]) == (1, 1)
+    assert not {"identify.duffing", "claims", "excitation_reading"} & set(jobs)
     assert ("estimator_errors" in jobs) == (file == "cases.tsv"), "ensembles have seeds of their own"
 
 
@@ -193,14 +190,14 @@ def test_seeds_of_the_study_are_no_business_of_the_ensembles(built):
 def test_the_seed_of_the_noise_is_no_business_of_what_has_none(built):
     with edited(built / "config" / "config.yaml", "noise_seed: 54", "noise_seed: 55"):
         jobs = planned(built)
-    assert (jobs["record"], jobs["identify"], jobs["claims"]) == (1, 1, 1), "claims judge the study's own noisy records"
-    assert not {"draw.duffing", "excitation_reading", "integrator_steps", "estimator_errors"} & set(jobs)
+    assert (jobs["record"], jobs["identify.noisy"], jobs["claims"]) == (1, 1, 1), "claims judge noisy records"
+    assert not {"identify.duffing", "excitation_reading", "integrator_steps", "estimator_errors"} & set(jobs)
 
 
 def test_targets_by_name_and_by_number(built):
     (built / "figures" / "figure_21.png").rename(built / "kept.png")
-    assert planned(built, "figures/figure_21.png") == {"draw.duffing": 1}
-    assert set(planned(built, "duffing")) == {"draw.duffing", "duffing"}
+    assert planned(built, "figures/figure_21.png") == {"identify.duffing": 1}
+    assert set(planned(built, "duffing")) == {"identify.duffing", "duffing"}
     (built / "kept.png").rename(built / "figures" / "figure_21.png")
     assert planned(built, "noisy") == {}
     monte_carlo = {"ensemble": 2, "rates": 1, "monte_carlo": 1}

@@ -25,6 +25,7 @@ from study.equations.place import Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.figures import page
+from study.figures.labels import term_names
 from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import MOTIONS, Record, Sensor
@@ -119,7 +120,7 @@ def _and(sensors: str) -> str:
 
 
 def _candidate(row: "pd.Series[Any]") -> str:
-    return f"{str(row['effect']).replace('_', ' ')} of {row['place']}"
+    return f"{term_names(str(row['effect']))} of {row['place']}"
 
 
 def sensors_place(tables: Tables, _: Reported) -> Iterator[Condition]:

@@ -115,23 +115,23 @@ def ladders_figure(tables: Tables) -> Figure:
         panel.set_ylabel("error (%)")
     if not records:
         axes[0].text(0.0, 0.5, "left out: the data are not there", transform=axes[0].transAxes)
-    page.letter(axes[: len(records)], [r.replace("_", " ") for r in records])
+    titles = dict(zip(rows["record"], rows["title"], strict=True))
+    page.letter(axes[: len(records)], [str(titles[record]) for record in records])
     return figure
 
 
 def told_measured(tables: Tables) -> list[Block]:
     """Every ladder beside what the literature reaches."""
     rows = [
-        [str(r["record"]).replace("_", " "), f"+ {term_names(str(r['added']))}" if r["step"] else "as given",
+        [str(r["title"]), f"+ {term_names(str(r['added']))}" if r["step"] else "as given",
          percent(r["error"]), f"{r['rms']:.3g} {r['unit']}", percent(r["floor"]),
          str(r["published"]) if not r["step"] else ""]
         for _, r in _there(tables).iterrows()
     ]  # fmt: skip
     said = (
         "Each ladder begins with the model that an engineer would believe in (config/measurements.tsv); its errors are "
-        "those of a free run along the part of the record that was not fitted. Faults of the measurement are "
-        "corrected as "
-        "the first model has them."
+        "those of a free run along the part of the record that was not fitted. An offset of the Silverbox's "
+        "response is corrected as the first model has it."
     )
     left = [Text(sentence) for sentence in left_out_records(tables)]
     head = ("record", "model", "error", "rms", "noise floor", "literature")

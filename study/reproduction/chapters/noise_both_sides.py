@@ -356,7 +356,7 @@ def noise_map(tables: Tables) -> Figure:
     figure, axes = page.empty_page(
         "Which estimator for my noise",
         "those with the least root mean square error of the worst of m, c, k, k3, c3; several are level", columns=2,
-        width=11.0, panel=3.6, legend_rows=0, share=False,
+        width=11.0, panel=4.4, legend_rows=0, share=False,
     )  # fmt: skip
     for panel, force in zip(axes, names, strict=True):
         _map_panel(panel, worst[worst["force"] == force], best[best["force"] == force])
@@ -403,7 +403,7 @@ def noise_bias(tables: Tables) -> Figure:
         for k, estimator in enumerate(used):
             _bias_marks(panel, rows[rows["estimator"] == estimator], estimator, k - (len(used) - 1) / 2.0)
         panel.set_xticks([100.0 * level for level in levels])
-        panel.set_ylim(-70.0, 50.0)
+        panel.set_ylim(-70.0, 60.0)
         panel.axhline(0.0, color="0.6", linewidth=0.8)
         if place >= len(axes) - len(COEFFICIENTS):
             panel.set_xlabel("noise on displacement (%)")

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.figures import page
+from study.figures.labels import term_names
 from study.figures.styles import look
 from study.identify import estimators
 from study.identify.estimators.base import Identified, Settings, true_parameters
@@ -200,7 +201,7 @@ def _recovered(
 
 def named(system: str) -> str:
     """A system as a table or a picture has room for it."""
-    return "combined" if system == COMBINED else system.replace("_", " ")
+    return "combined" if system == COMBINED else term_names(system)
 
 
 def ratio(value: float) -> str:
@@ -324,7 +325,7 @@ def spectra_map(tables: Tables) -> Figure:
         "error of the worst parameter over its tolerance; above 1 it is not recovered", rows=2, columns=2, width=13.0,
         panel=4.4, legend_rows=0, share=False,
     )  # fmt: skip
-    figure.subplots_adjust(left=0.11, bottom=0.08, top=0.92, wspace=0.26, hspace=0.3)
+    figure.subplots_adjust(left=0.11, bottom=0.08, top=0.92, wspace=0.3, hspace=0.3)
     for panel, (estimator, noisy) in zip(axes, panels, strict=True):
         own = worst[(worst["estimator"] == estimator) & ((worst["noise"] > 0.0) == noisy)]
         _map_of(panel, own.pivot_table(index="force", columns="system", values="over_tolerance", sort=False), forces)
@@ -447,7 +448,7 @@ def _narrowest(rows: pd.DataFrame) -> str:
 
 
 def _words(force: str) -> str:
-    return NAMES.get(force, f"noise, {force}")
+    return NAMES.get(force) or f"{force.split()[0]}-octave noise"
 
 
 CHAPTER = Chapter(
