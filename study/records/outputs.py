@@ -35,7 +35,8 @@ class Outputs:
         if len(self.sensors) == 1:
             return values[:, 0]
         weights = np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
-        return (values * weights).reshape(len(values) * len(self.sensors), *values.shape[2:])
+        with np.errstate(over="ignore"):  # what a motion that runs off leaves is beyond all measure
+            return (values * weights).reshape(len(values) * len(self.sensors), *values.shape[2:])
 
     def kept(self, lost: Bools) -> Floats:
         """1 for stacked values that count and 0 for those of lost samples, shape (n s,).
