@@ -314,7 +314,8 @@ def strung_together(
     first = completed[0].record
     for other in (c.record for c in completed[1:]):
         off = abs(other.dt / first.dt - 1.0)
-        rates = f"the record {first.name} is sampled at {1.0 / first.dt:.8g} Hz and {other.name} at {1.0 / other.dt:.8g} Hz"
+        one, two = f"{1.0 / first.dt:.8g} Hz", f"{1.0 / other.dt:.8g} Hz"
+        rates = f"the record {first.name} is sampled at {one} and {other.name} at {two}"
         again = "expected the same rate for records that are judged together: resample one of them"
         # an inertia is off by twice as much as the clock: practically nothing
         expect(off <= 0.5 * TOLERANCE, f"{rates}, {percent(off)} apart; {again}")
