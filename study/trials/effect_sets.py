@@ -34,25 +34,32 @@ class Truth:
 
     base: Baseline  # beside the coefficients that the believed model has
     added: Mapping[str, Floats]  # to the response by each hidden effect, beside these, shape (n s,)
+    remainder: Mapping[str, Floats]  # the same of a force that nothing asked for has; empty without any
     error: float  # that it leaves in what it was not fitted to
 
     def found(self, named: Sequence[ModelTerm], found_elsewhere: Collection[str] = ()) -> tuple[int, int]:
-        """How many of some named effects are each a hidden one of its own, and how many hidden ones they leave.
+        """How many of some named effects are each there, and how many hidden ones they leave.
 
-        ``found_elsewhere`` are hidden ones that a fault of the measurement stands for.
+        ``found_elsewhere`` are hidden ones that a fault of the measurement stands for where they are not named. What
+        is the remainder along this motion is there as well, but need not be named.
         """
-        hidden = [name for name in self.added if name not in found_elsewhere]
-        pairs = [self.same(entry, name) for entry in named for name in hidden]
-        same = np.array(pairs, dtype=bool).reshape(len(named), len(hidden))
-        count = int(np.sum(same[linear_sum_assignment(same, maximize=True)]))
-        return count, len(hidden) - count
+        names = [entry.name for entry in named]
+        hidden = [name for name in self.added if name in names or name not in found_elsewhere]
+        there = [*hidden, *self.remainder]
+        pairs = [self.same(entry, name) for entry in named for name in there]
+        first = np.array([2.0 if name in hidden else 1.0 for name in there])  # what is hidden is to be found
+        weighted = np.array(pairs, dtype=float).reshape(len(named), len(there)) * first
+        rows, columns = linear_sum_assignment(weighted, maximize=True)
+        met = [there[c] for r, c in zip(rows, columns, strict=True) if weighted[r, c] > 0.0]
+        return len(met), sum(name not in met for name in hidden)
 
     def same(self, entry: ModelTerm, name: str, alike: float = 0.98) -> bool:
-        """Whether a named effect is a hidden one, or correlates with it so much along this motion."""
+        """Whether a named effect is one that is there, or correlates with it so much along this motion."""
         if entry.name in self.added:
             return entry.name == name
         columns = sensitivity(entry, tuple(float(p or 0.0) for p in entry.parameters), self.base)
-        return columns is not None and explained_by(columns, self.added[name], ()).share > alike**2
+        added = {**self.added, **self.remainder}[name]
+        return columns is not None and explained_by(columns, added, ()).share > alike**2
 
 
 def truth_of(trial: Trial) -> Truth:
@@ -64,11 +71,13 @@ def truth_of(trial: Trial) -> Truth:
     known = [i for i in range(jacobian.shape[1]) if i >= len(fit.keys) or fit.keys[i] in trial.believed.values]
     basis = np.linalg.qr(jacobian[:, known] / length_or_one(jacobian[:, known]))[0]
     added: dict[str, Floats] = {}
-    for entry in (e for e in fit.model.terms if e.name in trial.hidden):
+    for entry in (e for e in fit.model.terms if e.name not in trial.believed):
         amounts = np.array([c or 0.0 for c in entry.coefficients])
         column = jacobian[:, [fit.keys.index(key) for key in entry.symbols]] @ amounts
         added[entry.name] = column - basis @ (basis.T @ column)
-    return Truth(replace(baseline(fit, prepared), basis=basis), added, predict(fit, prepared).error)
+    hidden = {name: column for name, column in added.items() if name in trial.hidden}
+    remainder = {name: column for name, column in added.items() if name not in hidden}
+    return Truth(replace(baseline(fit, prepared), basis=basis), hidden, remainder, predict(fit, prepared).error)
 
 
 def steady_ones(trial: Trial) -> tuple[str, ...]:

@@ -291,7 +291,7 @@ def _judged_rig(_: Order, trial: Trial) -> Row:
     elsewhere = steady_ones(trial) if "offset" in faults else ()
     hits = [truth.found(as_fitted(s), elsewhere) for s in diagnosis.sets]
     whole = [(len(s.names), 0) == hit for s, hit in zip(diagnosis.sets, hits, strict=True)]
-    right = diagnosis.verdict == NOTHING if not trial.hidden else answer is not None and whole[0]
+    right = (answer is not None and whole[0]) or (not trial.hidden and diagnosis.verdict == NOTHING)
     return row | {
         "there": 0 if answer is None else hits[0][0], "right": int(right), "holds": int(right or any(whole)),
         "error_true": truth.error,

@@ -77,6 +77,17 @@ def test_effects_that_are_one_along_a_motion_count_as_one(swings: Truth) -> None
     assert swings.found([entries[0], free(get("quadratic_damping"))]) == (1, 1), "one for each, not one for two"
     assert swings.found([]) == (0, 2)
     assert swings.found(entries[:1], ("quadratic_stiffness",)) == (1, 0)
+    assert swings.found(entries[:2], ("quadratic_stiffness",)) == (2, 0), "an offset beside it takes it from nobody"
+
+
+def test_what_is_the_remainder_along_a_motion_is_there_but_need_not_be_named(swings: Truth) -> None:
+    hidden, added = "quadratic_stiffness", dict(swings.added)
+    truth = replace(swings, added={hidden: added[hidden]}, remainder={"remainder": added["quadratic_damping"]})
+    damping, stiffness, another = (free(get(name)) for name in ("cubic_damping", hidden, "cubic_stiffness"))
+    assert truth.found([stiffness, damping]) == (2, 0)
+    assert truth.found([stiffness]) == (1, 0)
+    assert truth.found([damping]) == (1, 1), "what is hidden is left"
+    assert truth.found([stiffness, another]) == (1, 0)
 
 
 def test_an_effect_at_another_place_is_another_one() -> None:
