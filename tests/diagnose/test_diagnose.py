@@ -15,6 +15,7 @@ from study.diagnose.adding import added
 from study.diagnose.designs import AS_WAS
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.held_out import HeldOutResidual
+from study.diagnose.ranking import distance
 from study.diagnose.separation import rivals_of
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
@@ -26,6 +27,7 @@ from study.records import noise_floor
 from study.records.prepared import prepare_record
 from study.records.record import Record
 from study.support import statistics
+from study.support.thresholds import K
 
 DT = 0.02
 
@@ -288,3 +290,13 @@ def test_an_effect_of_a_decay_with_which_the_error_that_is_shown_grows_is_not_be
     before: Any = SimpleNamespace(error=0.05)
     own: Any = None
     assert verdict.believed(row, before, own) == expected
+
+
+def test_too_few_steps_make_an_effect_nobodys_equal(of_drag: Diagnosis):
+    first, *_, other = of_drag.candidates
+    white = {row.name: row.residual for row in (first, other)}
+    apart = distance(other, first, white)
+    assert apart > K
+    size = np.std(other.prediction.measured)
+    rough = replace(other, prediction=replace(other.prediction, numerical=np.array([size])))
+    assert distance(rough, first, white) == apart
