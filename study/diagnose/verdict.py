@@ -40,9 +40,6 @@ MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_kn
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-FAR_MORE = (
-    0.1  # of the rms response above the noise: what leaves so much is not called complete, whatever it depends on
-)
 CLOSE = 12  # sets near the best that are compared with it in every detail
 
 
@@ -67,7 +64,7 @@ class Diagnosis:
     @property
     def misses_much(self) -> bool:
         """Whether far more than noise is left, and depends on nothing that the record shows."""
-        return self.verdict == UNKNOWN and self.left <= TOLERANCE and self.comparison.prediction.above_noise > FAR_MORE
+        return self.verdict == UNKNOWN and self.left <= TOLERANCE and _leaves_much(self.comparison.prediction)
 
     @property
     def changes(self) -> bool:
@@ -310,13 +307,18 @@ def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, as
         left = _left(comparison.fit, comparison.prediction)
         # what is left along another motion tells nothing
         lost = has_lost_the_motion(comparison.fit, comparison.prepared)
-        much = comparison.prediction.above_noise > FAR_MORE
-        return _Decision(UNKNOWN if left > TOLERANCE or lost or much else NOTHING, rows, left, [])
+        missing = left > TOLERANCE or lost or _leaves_much(comparison.prediction)
+        return _Decision(UNKNOWN if missing else NOTHING, rows, left, [])
     left = _left(first.fit, first.prediction)
     alone = [first, *(r for r in rows if r.name in first.tied_with)]
     if (first.gain.explained >= ENOUGH or left <= GOOD) and not (first.unphysical or first.wanders(asked)):
         return _Decision(MISSING, [first] + [r for r in rows if r is not first], left, alone)
     return _Decision(UNKNOWN, rows, left, alone)
+
+
+def _leaves_much(prediction: Prediction) -> bool:
+    """Whether more than ten times as much is above the noise as models of real structures leave."""
+    return prediction.above_noise > 10.0 * GOOD
 
 
 def _nearly_all(row: Ranked) -> bool:
