@@ -37,10 +37,10 @@ class Suspect:
 
 
 def first_of_all(tried: Sequence[FittedCandidate], changes: PromisedChanges, comparison: Comparison) -> bool:
-    """Whether a change promises to explain more than the best of other effects does, as fitted to both parts."""
+    """Whether a coefficient that changes promises more than the best other effect, fitted to both parts, explains."""
     power = float(np.mean(np.concatenate([comparison.fit.residual, comparison.prediction.residual]) ** 2))
     least = min((c.power for c in tried if not c.unphysical), default=power)
-    return power > 0.0 and changes.most >= 1.0 - least / power
+    return power > 0.0 and changes.together >= 1.0 - least / power
 
 
 def explains_more(changes: PromisedChanges, effects: Sequence[str]) -> bool:

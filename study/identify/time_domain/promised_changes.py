@@ -39,6 +39,16 @@ class PromisedChanges:
         return max(self.shares.values())
 
     @property
+    def together(self) -> float:
+        """The largest share of one coefficient, its two sides added: they act at other times."""
+        sides: dict[tuple[str, str], dict[str, float]] = {}
+        for entry, share in self.shares.items():
+            if (variation := entry.term.variation) is not None:
+                own = sides.setdefault((variation.of.name, entry.place.label), {})
+                own[variation.side] = max(share, own.get(variation.side, 0.0))
+        return max(max(own.get("", 0.0), sum(s for side, s in own.items() if side)) for own in sides.values())
+
+    @property
     def alone(self) -> bool:
         """Whether a change explains so much that others are asked for beside it from the start."""
         return self.most > PROMISING
