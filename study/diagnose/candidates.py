@@ -23,7 +23,7 @@ from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
-from study.support.thresholds import PROMISING
+from study.support.thresholds import PROMISING, TOLERANCE
 
 FITTED = 12  # of many, those that promise most, whatever they are: fitted in free run ...
 AT_EACH_PLACE = 2  # ... with so many at each place that explain ``PROMISING`` of what the best explains ...
@@ -83,6 +83,15 @@ class FittedCandidate:
         own = prediction.numerical * np.array(prediction.prepared.outputs.weights)
         size = float(np.std(prediction.above(prediction.prepared.judged)))
         return max(float(np.sqrt(np.mean(own**2))), ROUNDED * size)
+
+    def predicts_as(self, other: "FittedCandidate") -> bool:
+        """Whether both are forms of one equation: their predictions differ by no more than the numbers' own error.
+
+        And by practically nothing: too few steps for a stiff effect make it nobody's equal.
+        """
+        apart = float(np.sqrt(np.mean((self.prediction.residual - other.prediction.residual) ** 2)))
+        size = float(np.std(self.prediction.above(self.prediction.prepared.judged)))
+        return self is other or apart <= min(math.hypot(self.numerical, other.numerical), TOLERANCE * size)
 
     @cached_property
     def unphysical(self) -> str:

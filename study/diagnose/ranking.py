@@ -1,6 +1,5 @@
 """Candidates in order: by what they leave of samples that they were not fitted to, and which of them are a tie."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -16,7 +15,7 @@ from study.identify.time_domain.weighted_fit import noise_left
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
-from study.support.thresholds import ALPHA, NEARLY, TOLERANCE, K
+from study.support.thresholds import ALPHA, NEARLY, K
 
 R = TypeVar("R", bound=Ranked)
 
@@ -75,14 +74,9 @@ def _beside_the_longest(white: Mapping[str, Floats]) -> dict[str, float]:
 def distance(row: Ranked, other: Ranked, white: Mapping[str, Floats]) -> float:
     """By how many standard errors a candidate leaves more than another of samples that neither was fitted to.
 
-    Zero for two forms of one equation, whose predictions differ by no more than the numbers' own error, where that is
-    practically nothing: too few steps for a stiff effect make it nobody's equal. ``white`` holds the whitened residuals
-    by name.
+    Zero for two forms of one equation. ``white`` holds the whitened residuals by name.
     """
-    apart = float(np.sqrt(np.mean((row.residual - other.residual) ** 2)))
-    own = math.hypot(row.numerical, other.numerical)
-    size = float(np.std(row.prediction.above(row.prediction.prepared.judged)))
-    if row is other or apart <= min(own, TOLERANCE * size):
+    if row.predicts_as(other):
         return 0.0
     return statistics.worse(*_common(white[row.name], white[other.name]))
 

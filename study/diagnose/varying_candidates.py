@@ -163,6 +163,4 @@ def _beaten(one: FittedCandidate, other: FittedCandidate) -> bool:
 
 def _level(one: FittedCandidate, best: FittedCandidate) -> bool:
     """Whether a candidate leaves no more than the best, but for chance and the numbers' own error."""
-    left, least = one.prediction.residual, best.prediction.residual
-    apart = float(np.sqrt(np.mean((left - least) ** 2)))
-    return apart <= np.hypot(one.numerical, best.numerical) or statistics.worse(left, least) < K
+    return one.predicts_as(best) or statistics.worse(one.prediction.residual, best.prediction.residual) < K
