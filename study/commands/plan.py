@@ -66,7 +66,7 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments, model)
     asked = arguments.max_force, arguments.max_displacement, arguments.max_length
     with progress(" steps", name=records[0].name) as step:
-        accounted = accounted_together(arguments, model, records, arguments.records[0])
+        accounted = accounted_together(arguments, model, records, arguments.records[0], progress=step)
         diagnosis = diagnose_accounted(
             accounted,
             without=tuple(arguments.without),

@@ -14,7 +14,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.completion import derivative
 from study.records.driven_by_motion import SAID
 from study.records.excitation import Excitation, force
-from study.records.interpolation import between_samples
+from study.records.interpolation import between_samples, largest_between
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.states import starting_states
@@ -73,6 +73,11 @@ class PresentTest:
     deflection: Floats  # state that it can be let go from, shape (2 coordinates,); empty where it cannot
     coordinates: int
     based: bool  # whether the base moves, whose acceleration stands for the force
+    every: int  # samples of the record, and of what drives a test, to one of the fit
+
+    def drives(self, record: Record) -> float:
+        """Largest absolute value of what drives a test, at the rate at which it is written."""
+        return largest_between(record.columns(self.drivers), self.every)
 
     @property
     def driven_by(self) -> str:
@@ -152,7 +157,7 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     forces = () if prepared.free else tuple(f for f in record.forces if f in source)
     drivers = tuple(str(Sensor(c, MOTIONS[0])) for c in record.coordinates) if prescribed else forces
     centred = [s.columns(drivers) - prescribed * np.mean(s.columns(drivers), axis=0) for s in sources]
-    peaks = np.max(np.abs(np.concatenate(centred)), axis=0, initial=0.0)
+    peaks = np.array([max(largest_between(s[:, [i]], prepared.every) for s in centred) for i in range(len(drivers))])
     seen = source.columns(prepared.outputs.sensors)
     power, shown = _power(source.columns(drivers) if drivers else seen), _power(seen)
     spacing, share = 1.0 / (len(source) * source.dt), np.cumsum(power) / np.sum(power)
@@ -174,7 +179,7 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
         bool(drivers) or bool(np.any(deflection)),
         f"{record.name}: no displacement or velocity tells from where it was let go; expected one to plan a release",
     )
-    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based)
+    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based, prepared.every)
 
 
 def _power(values: Floats) -> Floats:
@@ -225,7 +230,7 @@ def possible_designs(
 
 def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:
     """Whether the forces of a test are within their limit; where no force drives it, they are."""
-    return present.prescribed or all(float(np.max(np.abs(design.record[f]))) <= limits.force for f in present.drivers)
+    return present.prescribed or present.drives(design.record) <= limits.force
 
 
 def _loudest(

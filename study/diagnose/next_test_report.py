@@ -46,8 +46,10 @@ def next_test_in_words(found: NextTest) -> str:
             for i in range(len(rows)) for j in range(len(rows))
             if i != j and choice.pairs[i, j] < 0.1
         ]  # fmt: skip
-        if level:
+        if 0 < len(level) <= 3:
             words.append(f"If the first of a pair is true, it would not tell {enumerated(level)}.")
+        elif level:
+            words.append(f"It would not tell {len(level)} of the {len(rows) * (len(rows) - 1)} pairs apart.")
     if not choice.rehearsed and choice.promise >= WORTH:
         words.append("That rests on sensitivities alone: the test cannot be rehearsed together with this record.")
     if choice.sensor is not None:
@@ -99,8 +101,7 @@ def design_in_words(design: Design, present: PresentTest) -> str:
     record = design.record
     if design.kind == LET_GO:
         return f"{_let_go(design, present)}, {design.length:.3g} s"
-    loudest = max(present.drivers, key=lambda d: float(np.max(np.abs(record[d]))))
-    peak = _quantity(float(np.max(np.abs(record[loudest]))), record.unit(loudest))
+    peak = _quantity(present.drives(record), record.unit(present.drivers[0]))
     times = "the same" if design.level == 1.0 else f"{design.level:.2g} times the"
     level = f"at {times} level (largest {present.driven_by} {peak})"
     match design.kind:
