@@ -20,7 +20,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     limits = parser.add_argument_group("limits of the test (default: what this record reached)")
     limits.add_argument(
         "--max-force", type=finite_number(above=0.0), metavar="VALUE",
-        help="largest force, in the unit of the record; of a moving base its largest acceleration",
+        help="largest force, in the unit of the record; of a moving base its largest acceleration in m/s^2, of "
+        "motions in mm in mm/s^2",
     )  # fmt: skip
     limits.add_argument(
         "--max-displacement", type=finite_number(above=0.0), metavar="VALUE", help="largest displacement anywhere"

@@ -74,10 +74,27 @@ class PresentTest:
     coordinates: int
     based: bool  # whether the base moves, whose acceleration stands for the force
     every: int  # samples of the record, and of what drives a test, to one of the fit
+    scale: float  # force of the fit over what drives: minus the mass, where its base's acceleration drives a single one
 
-    def drives(self, record: Record) -> float:
-        """Largest absolute value of what drives a test, at the rate at which it is written."""
-        return largest_between(record.columns(self.drivers), self.every)
+    def signals(self, record: Record) -> Floats:
+        """What drives a test in its own unit, a base's acceleration and no force, shape (n, drivers)."""
+        return record.columns(self.drivers) / self.scale
+
+    def largest(self, record: Record) -> float:
+        """Largest absolute value of that, at the rate at which it is written."""
+        return largest_between(self.signals(record), self.every)
+
+    @property
+    def reached(self) -> float:
+        """Largest absolute value of what drove the record; zero where it was let go."""
+        return float(np.max(self.peaks, initial=0.0)) / abs(self.scale)
+
+    @property
+    def unit(self) -> str:
+        """Of what drives; empty where it was let go."""
+        if self.based:
+            return f"{self.source.force_and_length[1]}/s^2"
+        return self.source.unit(self.drivers[0]) if self.drivers else ""
 
     @property
     def driven_by(self) -> str:
@@ -174,12 +191,16 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
         f"{record.name}: a release of a structure is not planned; expected a record with a force, or of a single mass",
     )
     based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
+    # the way in takes the mass that the model gives as known, and one where it gives none
+    scale = -(fit.model.values.get("m") or 1.0) if based and drivers == (FORCE,) else 1.0
     deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table
     expect(
         bool(drivers) or bool(np.any(deflection)),
         f"{record.name}: no displacement or velocity tells from where it was let go; expected one to plan a release",
     )
-    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based, prepared.every)
+    return PresentTest(
+        source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based, prepared.every, scale
+    )
 
 
 def _power(values: Floats) -> Floats:
@@ -230,7 +251,7 @@ def possible_designs(
 
 def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:
     """Whether the forces of a test are within their limit; where no force drives it, they are."""
-    return present.prescribed or present.drives(design.record) <= limits.force
+    return present.prescribed or present.largest(design.record) <= limits.force
 
 
 def _loudest(
@@ -238,7 +259,7 @@ def _loudest(
 ) -> float:
     """The largest level of a kind of test within the limits, about; zero if none is found."""
     if present.drivers:
-        level = (limits.displacement if present.prescribed else limits.force) / float(np.max(present.peaks))
+        level = (limits.displacement if present.prescribed else limits.force) / present.reached
     else:
         share = reached(make(1.0))
         level = 1.0 / share if 0.0 < share < np.inf else 1.0

@@ -29,7 +29,7 @@ from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.interpolation import between_samples
 from study.records.outputs import Noise
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.record_layout import Layout
 from study.support import statistics
@@ -98,7 +98,7 @@ def next_test(
     *,
     sensors: Sequence[str] = (),
     rehearsals: int = 3,
-    progress: Doing = lambda *_: None,
+    progress: Doing | None = None,
 ) -> NextTest:
     """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
 
@@ -114,7 +114,8 @@ def next_test(
         If the limits allow no test, or there is no such sensor.
     """
     fits, present, extra = rivals.fits, rivals.present, further_sensors(rivals, sensors)
-    progress("asking how loud tests may be", len(present.kinds))
+    if progress:
+        progress("asking how loud tests may be", len(present.kinds))
     found = _screened(rivals, [(design, None) for design in allowed(fits, present, limits)], progress)
     again = next((c for c in found if c.design.kind == present.kinds[0][0] and c.design.level == 1.0), None)
     asked = len(found)
@@ -147,11 +148,12 @@ def next_test(
     return NextTest(rivals, limits, best, again, asked)
 
 
-def _screened(rivals: Rivals, tests: Sequence[tuple[Design, Sensor | None]], progress: Doing) -> list[Choice]:
+def _screened(rivals: Rivals, tests: Sequence[tuple[Design, Sensor | None]], progress: Doing | None) -> list[Choice]:
     """What tests separate by the rivals' sensitivities, but those in which one of them does not stay finite."""
     found = list[Choice]()
     for number, (design, sensor) in enumerate(tests):
-        progress("comparing tests", len(tests) - number)
+        if progress:
+            progress("comparing tests", len(tests) - number)
         try:
             distances = rivals.distances(design, sensor)
         except StudyError:
@@ -188,7 +190,7 @@ def further_sensors(rivals: Rivals, names: Sequence[str] = ()) -> tuple[Sensor, 
     return tuple(found[name] for name in names or found)
 
 
-def rehearsed(rivals: Rivals, choice: Choice, times: int, progress: Doing = lambda *_: None) -> Choice:
+def rehearsed(rivals: Rivals, choice: Choice, times: int, progress: Doing | None = None) -> Choice:
     """A test with what it decides when it is simulated, with noise, and judged together with this record.
 
     By how many standard errors a rival leaves more than the true one is normal, with a variance of one or what the
@@ -200,7 +202,8 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int, progress: Doing = lamb
     for true in range(count):
         behind = list[Floats]()
         for time in range(times):
-            progress(f"rehearsing the {choice.design.kind}", times * (count - true) - time)
+            if progress:
+                progress(f"rehearsing the {choice.design.kind}", times * (count - true) - time)
             try:
                 record = simulated(rivals, choice, true, rng)
                 behind.append(np.delete(compared_in(rivals, record, true, alone=choice.sensor is not None), true))
@@ -305,16 +308,17 @@ def judged_together(rivals: Rivals, record: Record, *, alone: bool) -> Prepared:
     ]
 
 
-def driving(present: PresentTest, design: Design, prepared: Prepared, mass: float | None) -> dict[str, Floats]:
-    """What drives a test, at the rate at which the record was sampled, shape (n,) each; nothing where it is let go.
+def driving(present: PresentTest, design: Design, every: int) -> dict[str, Floats]:
+    """What drives a test, shape (n,) each, at so many samples to one of the fit; nothing where it is let go.
 
-    Of a single ``mass`` on a moving base that is the base's acceleration.
+    Of a single mass on a moving base that is the base's acceleration.
     """
-    names = present.drivers if design.kind != LET_GO else ()
-    fine = {name: between_samples(design.record[name], prepared.every) for name in names}
-    if FORCE in fine and present.based:
-        return {OF_THE_GROUND: -fine[FORCE] / (mass or 1.0)}
-    return fine
+    if design.kind == LET_GO:
+        return {}
+    names = (OF_THE_GROUND,) if present.based else present.drivers
+    return {
+        name: between_samples(own, every) for name, own in zip(names, present.signals(design.record).T, strict=True)
+    }
 
 
 @lru_cache(maxsize=4)

@@ -210,7 +210,7 @@ def limit_share(fits: Sequence[FreeRunFit], present: PresentTest, design: Design
     except StudyError:
         return np.inf
     if present.prescribed:
-        return max(largest / limits.force, present.drives(design.record) / limits.displacement)
+        return max(largest / limits.force, present.largest(design.record) / limits.displacement)
     return largest / limits.displacement
 
 
@@ -218,7 +218,7 @@ def own_limits(fits: Sequence[FreeRunFit], present: PresentTest, times: float = 
     """So many times what a record reached, as the models have it, and its length."""
     length = len(present.source) * present.source.dt
     kind, place = present.kinds[0]
-    driven = float(np.max(present.peaks, initial=0.0)) or 1.0
+    driven = present.reached or 1.0
     answered = limit_share(
         fits, present, present.design(kind, place, len(present.source), 1.0), Limits(1.0, np.inf, length)
     )
