@@ -2,6 +2,8 @@
 import sys
 from pathlib import Path
 
+from snakemake import benchmark
+
 from study.reproduction.config import load_config
 from study.support.workflow_step import one_sentence, only_run, remove_half_written
 
@@ -21,6 +23,8 @@ onstart:
     # waits for nothing but a core, and the one that ends says so.
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
+        # What a job's memory is, a thread asks twice a second of this process and all below it; only its time is told.
+        benchmark.BENCHMARK_INTERVAL_SHORT = benchmark.BENCHMARK_INTERVAL
 
 
 include: "rules/common.smk"

@@ -23,8 +23,8 @@ for _case in STUDY.cases:
             drawn=STUDY.drawn(_case),
         benchmark:
             f"results/benchmarks/identify.{_case}.tsv"
-        script:
-            "../scripts/identify.py"
+        run:
+            step("identify", input, output, params, wildcards)
 
     rule:
         name:

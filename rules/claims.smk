@@ -38,8 +38,8 @@ rule excitation_reading:
     priority: 1
     benchmark:
         "results/benchmarks/excitation_reading.tsv"
-    script:
-        "../scripts/excitation_reading.py"
+    run:
+        step("excitation_reading", input, output, params, wildcards)
 
 
 rule integrator_steps:
@@ -59,8 +59,8 @@ rule integrator_steps:
     priority: 1
     benchmark:
         "results/benchmarks/integrator_steps.tsv"
-    script:
-        "../scripts/integrator_steps.py"
+    run:
+        step("integrator_steps", input, output, params, wildcards)
 
 
 rule claims:
@@ -82,5 +82,5 @@ rule claims:
     priority: 1
     benchmark:
         "results/benchmarks/claims.tsv"
-    script:
-        "../scripts/claims.py"
+    run:
+        step("claims", input, output, params, wildcards)

@@ -26,8 +26,8 @@ rule estimator_errors:
         seeds=COMPARED.seeds,
     benchmark:
         "results/benchmarks/estimator_errors.tsv"
-    script:
-        "../scripts/monte_carlo.py"
+    run:
+        step("monte_carlo", input, output, params, wildcards)
 
 
 use rule ensemble as many_errors with:
@@ -70,8 +70,8 @@ rule draw_estimators:
         cases=list(STUDY.cases),
     benchmark:
         "results/benchmarks/draw_estimators.tsv"
-    script:
-        "../scripts/draw.py"
+    run:
+        step("draw", input, output, params, wildcards)
 
 
 use rule draw_estimators as draw_many_errors with:

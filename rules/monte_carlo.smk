@@ -13,8 +13,8 @@ rule ensemble:
         first_seed=STUDY.settings.monte_carlo.first_seed,
     benchmark:
         "results/benchmarks/ensemble.{case}.tsv"
-    script:
-        "../scripts/monte_carlo.py"
+    run:
+        step("monte_carlo", input, output, params, wildcards)
 
 
 rule rates:
@@ -23,8 +23,8 @@ rule rates:
         code=CODE["join"],
     output:
         table="results/monte_carlo.csv",
-    script:
-        "../scripts/join.py"
+    run:
+        step("join", input, output, params, wildcards)
 
 
 rule monte_carlo:
@@ -35,5 +35,5 @@ rule monte_carlo:
         monte_carlo="results/monte_carlo.md",
     params:
         noise=STUDY.noise,
-    script:
-        "../scripts/pages.py"
+    run:
+        step("pages", input, output, params, wildcards)

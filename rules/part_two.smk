@@ -50,8 +50,8 @@ for _chapter, _contents in CHAPTERS.items():
         priority: 1
         benchmark:
             f"results/benchmarks/chapter.{_chapter}.tsv"
-        script:
-            "../scripts/chapter.py"
+        run:
+            step("chapter", input, output, params, wildcards)
 
 
 # Ladders of the records that are there; of another folder of data, or when a file comes or goes, they are made anew.
@@ -68,8 +68,8 @@ rule ladders:
         there=[path for row in LADDER_ROWS.values() for path in row.paths if Path(path).is_file()],
     benchmark:
         "results/benchmarks/chapter.measured.tsv"
-    script:
-        "../scripts/ladders.py"
+    run:
+        step("ladders", input, output, params, wildcards)
 
 
 rule part_two_claims:
@@ -81,8 +81,8 @@ rule part_two_claims:
         claims=PART_TWO_CLAIMS,
     benchmark:
         "results/benchmarks/part_two_claims.tsv"
-    script:
-        "../scripts/part_two.py"
+    run:
+        step("part_two", input, output, params, wildcards)
 
 
 rule draw_part_two:
@@ -94,8 +94,8 @@ rule draw_part_two:
         **PART_TWO_FIGURES,
     benchmark:
         "results/benchmarks/draw_part_two.tsv"
-    script:
-        "../scripts/part_two.py"
+    run:
+        step("part_two", input, output, params, wildcards)
 
 
 PART_TWO_BENCHMARKS = [f"results/benchmarks/chapter.{chapter}.tsv" for chapter in CHAPTERS]

@@ -14,5 +14,5 @@ rule record:
         settings=record_settings,
     benchmark:
         "results/benchmarks/record.{case}.tsv"
-    script:
-        "../scripts/make_record.py"
+    run:
+        step("make_record", input, output, params, wildcards)

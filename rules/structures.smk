@@ -4,7 +4,7 @@ from study.reproduction.config import load_structures
 with one_sentence():
     STRUCTURES = load_structures(Path("config"), list(STUDY.cases))
 
-CODE["structure"] = rests_on(Path("scripts/structure_case.py"))
+CODE["structure"] = modules("structure_case")
 # What is made of a case: in reverse, equation by equation, or by its modes.
 STRUCTURE_TABLES = {
     "": {
@@ -53,8 +53,8 @@ for _name, _case in STRUCTURES.cases.items():
             limits=STRUCTURES.settings.limits,
         benchmark:
             f"results/benchmarks/structure.{_name}.tsv"
-        script:
-            "../scripts/structure_case.py"
+        run:
+            step("structure_case", input, output, params, wildcards)
 
     rule:
         name:

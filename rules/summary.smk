@@ -34,8 +34,8 @@ rule parameters:
         ),
     params:
         without=["note"],
-    script:
-        "../scripts/join.py"
+    run:
+        step("join", input, output, params, wildcards)
 
 
 rule summary:
@@ -68,8 +68,8 @@ rule summary:
         setting=STUDY.settings.excitations["report"].reading,
         titles=STRUCTURE_TITLES,
         tables=TABLE_PAGES,
-    script:
-        "../scripts/pages.py"
+    run:
+        step("pages", input, output, params, wildcards)
 
 
 # Both parts on one page with one table of contents.
@@ -93,5 +93,5 @@ rule study_page:
         setting=STUDY.settings.excitations["report"].reading,
         pictures=PICTURES + STRUCTURE_PICTURES + PART_TWO_PICTURES,
         titles=STRUCTURE_TITLES,
-    script:
-        "../scripts/pages.py"
+    run:
+        step("pages", input, output, params, wildcards)

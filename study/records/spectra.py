@@ -51,6 +51,8 @@ class Segments:
             return np.hanning(self.length + 1)[:-1]
         if self.window == "kaiser":
             return np.kaiser(self.length + 1, 20.0)[:-1]  # side lobes at -150 dB
+        if self.window == "boxcar":
+            return np.ones(self.length)
         from scipy.signal import get_window
 
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)

@@ -23,7 +23,7 @@ from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-KEPT = 9  # ensembles of records held at a time: the seven systems and those being worked on
+KEPT = 20  # ensembles of records held at a time, 7 MB each: so many that few are simulated twice
 
 
 @dataclass(frozen=True)
