@@ -1,11 +1,11 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
 from study.identify.estimators import ESTIMATORS
-from study.support.step_server import StepServer, run_here
+from study.support import step_server
 from study.support.workflow_step import rests_on
 
 # Scripts of steps that take less time than a start of Python with its packages, or little more.
 STEP_SCRIPTS = ("make_record", "identify", "monte_carlo", "draw", "claims", "excitation_reading", "integrator_steps", "structure_case", "join", "pages", "chapter", "part_two")
-STEPS = StepServer([f"scripts/{script}.py" for script in STEP_SCRIPTS]) if workflow.is_main_process else None
+step_server.preload(f"scripts/{script}.py" for script in STEP_SCRIPTS)
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/cases.py: what only identification uses is not followed from there.
@@ -26,7 +26,7 @@ def modules(script, **options):
 def step(script, input, output, params, wildcards):
     """Run a script as a rule's step: in a process of its own that has its packages already, or that is the job's."""
     told = {"input": input, "output": output, "params": params, "wildcards": wildcards}
-    (STEPS.run if STEPS else run_here)(f"scripts/{script}.py", told)
+    (step_server.run_forked if workflow.is_main_process else step_server.run_here)(f"scripts/{script}.py", told)
 
 
 CODE = {
