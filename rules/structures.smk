@@ -1,5 +1,5 @@
 # Structures of several coordinates: each case of config/structures.tsv in one job, and what is said of all of them.
-from study.reproduction.structure_cases import load_structures
+from study.reproduction.config import load_structures
 
 with one_sentence():
     STRUCTURES = load_structures(Path("config"), list(STUDY.cases))
@@ -50,7 +50,7 @@ for _name, _case in STRUCTURES.cases.items():
             case=_case.plain(),
             record=STRUCTURES.record_settings(_name).plain(),
             settings=STRUCTURES.identification_settings(_name).plain(),
-            limits=STRUCTURES.settings.claims.plain(),
+            limits=STRUCTURES.settings.limits,
         benchmark:
             f"results/benchmarks/structure.{_name}.tsv"
         run:

@@ -10,22 +10,22 @@ from study.records.prepared import prepare_record
 from study.records.record import write_csv
 from study.reproduction import structure_figures, structure_tables, tables
 from study.reproduction.cases import make_record
+from study.reproduction.config import Case
 from study.reproduction.settings import IdentificationSettings, RecordSettings
-from study.reproduction.structure_cases import ClaimLimits, StructureCase, identify_equations, modal_model
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence
 
 
 def main(
-    model: Path, style: Path, outputs: Mapping[str, Path], pictures: Mapping[str, Sequence[Path]], case: StructureCase,
-    made_by: RecordSettings, settings: IdentificationSettings, limits: ClaimLimits,
+    model: Path, style: Path, outputs: Mapping[str, Path], pictures: Mapping[str, Sequence[Path]], case: Case,
+    made_by: RecordSettings, settings: IdentificationSettings, limits: Mapping[str, float],
 ) -> None:  # fmt: skip
     structure, title = read_model(model), case.title
     record = make_record(structure, made_by)
     with replacing(outputs["record"]) as beside:
         write_csv(record, beside)
     if case.modal:
-        comparison = compare(modal_model(structure, case.sensors), prepare_record(record))
+        comparison = compare(structure_tables.modal_model(structure, case.sensors), prepare_record(record))
         highest = made_by.excitation.at_level(made_by.level).highest
         responses = structure_tables.modal_responses(structure, comparison, settings, highest)
         made = {
@@ -35,7 +35,7 @@ def main(
         }
         figures = {"measured": lambda: structure_figures.modal_figure(responses, title)}
     else:  # by its equations of motion
-        result = identify_equations(structure, record, settings)
+        result = structure_tables.identify_equations(structure, record, settings)
         responses = structure_tables.structure_responses(result)
         coherences = structure_tables.structure_coherences(result)
         made = {
@@ -62,6 +62,6 @@ if "snakemake" in globals():
         main(
             Path(step.input.model), Path(step.input.style), made,
             {kind.removeprefix("draw_"): paths for kind, paths in drawn.items()},
-            StructureCase.model_validate(step.params.case), RecordSettings.model_validate(step.params.record),
-            IdentificationSettings.model_validate(step.params.settings), ClaimLimits.model_validate(step.params.limits),
+            Case.model_validate(step.params.case), RecordSettings.model_validate(step.params.record),
+            IdentificationSettings.model_validate(step.params.settings), step.params.limits,
         )  # fmt: skip

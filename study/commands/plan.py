@@ -20,7 +20,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     limits = parser.add_argument_group("limits of the test (default: what this record reached)")
     limits.add_argument(
         "--max-force", type=finite_number(above=0.0), metavar="VALUE",
-        help="largest force, in the unit of the record; of a moving base its largest acceleration",
+        help="largest force, in the unit of the record; of a moving base its largest acceleration in m/s^2, of "
+        "motions in mm in mm/s^2",
     )  # fmt: skip
     limits.add_argument(
         "--max-displacement", type=finite_number(above=0.0), metavar="VALUE", help="largest displacement anywhere"
@@ -66,7 +67,7 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments, model)
     asked = arguments.max_force, arguments.max_displacement, arguments.max_length
     with progress(" steps", name=records[0].name) as step:
-        accounted = accounted_together(arguments, model, records, arguments.records[0])
+        accounted = accounted_together(arguments, model, records, arguments.records[0], progress=step)
         diagnosis = diagnose_accounted(
             accounted,
             without=tuple(arguments.without),

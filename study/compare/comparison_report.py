@@ -13,7 +13,7 @@ from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.decay import decays_of
 from study.compare.dependence import explained_by_place
-from study.compare.fitted_coefficients import Coefficient, Level
+from study.compare.fitted_coefficients import Coefficient, Level, value_and_interval
 from study.compare.force_map import curve, surface
 from study.compare.varying_coefficients import varying_fields
 from study.equations import model_file
@@ -423,12 +423,8 @@ def _headline(comparison: Comparison) -> str:
 
 
 def _values(comparison: Comparison) -> str:
-    rows = [[c.key, c.term, f"{c.value:.5g}", _interval(c), c.unit] for c in comparison.coefficients]
+    rows = [[c.key, c.term, *value_and_interval(c), c.unit] for c in comparison.coefficients]
     return tabulate(rows, ["", "term", "value", "95 % interval", "unit"], tablefmt="simple", disable_numparse=True)
-
-
-def _interval(coefficient: Coefficient) -> str:
-    return "held" if coefficient.interval is None else f"{coefficient.interval[0]:.5g} to {coefficient.interval[1]:.5g}"
 
 
 def _levels(moving: Sequence[Level], comparisons: Sequence[Comparison]) -> str:

@@ -17,7 +17,7 @@ from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.identify.time_domain.rivals import larger
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.support.numbers import percent
+from study.support.numbers import digits_between, percent
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,15 @@ class Coefficient:
         quantile = float(stdtrit(self.freedom, 0.975)) if math.isfinite(self.freedom) else float(ndtri(0.975))
         half = quantile * self.error
         return self.value - half, self.value + half
+
+
+def value_and_interval(found: Coefficient) -> tuple[str, str]:
+    """Both as they are shown: with the digits that tell the ends of the interval apart, or ``held``."""
+    if found.interval is None:
+        return f"{found.value:.5g}", "held"
+    low, high = found.interval
+    digits = digits_between(found.value, high - low)
+    return f"{found.value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
 
 
 def found_by(fit: FreeRunFit, prepared: Prepared) -> Estimate:

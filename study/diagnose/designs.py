@@ -14,7 +14,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.completion import derivative
 from study.records.driven_by_motion import SAID
 from study.records.excitation import Excitation, force
-from study.records.interpolation import between_samples
+from study.records.interpolation import between_samples, largest_between
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.states import starting_states
@@ -73,6 +73,28 @@ class PresentTest:
     deflection: Floats  # state that it can be let go from, shape (2 coordinates,); empty where it cannot
     coordinates: int
     based: bool  # whether the base moves, whose acceleration stands for the force
+    every: int  # samples of the record, and of what drives a test, to one of the fit
+    scale: float  # force of the fit over what drives: minus the mass, where its base's acceleration drives a single one
+
+    def signals(self, record: Record) -> Floats:
+        """What drives a test in its own unit, a base's acceleration and no force, shape (n, drivers)."""
+        return record.columns(self.drivers) / self.scale
+
+    def largest(self, record: Record) -> float:
+        """Largest absolute value of that, at the rate at which it is written."""
+        return largest_between(self.signals(record), self.every)
+
+    @property
+    def reached(self) -> float:
+        """Largest absolute value of what drove the record; zero where it was let go."""
+        return float(np.max(self.peaks, initial=0.0)) / abs(self.scale)
+
+    @property
+    def unit(self) -> str:
+        """Of what drives; empty where it was let go."""
+        if self.based:
+            return f"{self.source.force_and_length[1]}/s^2"
+        return self.source.unit(self.drivers[0]) if self.drivers else ""
 
     @property
     def driven_by(self) -> str:
@@ -152,7 +174,7 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
     forces = () if prepared.free else tuple(f for f in record.forces if f in source)
     drivers = tuple(str(Sensor(c, MOTIONS[0])) for c in record.coordinates) if prescribed else forces
     centred = [s.columns(drivers) - prescribed * np.mean(s.columns(drivers), axis=0) for s in sources]
-    peaks = np.max(np.abs(np.concatenate(centred)), axis=0, initial=0.0)
+    peaks = np.array([max(largest_between(s[:, [i]], prepared.every) for s in centred) for i in range(len(drivers))])
     seen = source.columns(prepared.outputs.sensors)
     power, shown = _power(source.columns(drivers) if drivers else seen), _power(seen)
     spacing, share = 1.0 / (len(source) * source.dt), np.cumsum(power) / np.sum(power)
@@ -169,12 +191,16 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
         f"{record.name}: a release of a structure is not planned; expected a record with a force, or of a single mass",
     )
     based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
+    # the way in takes the mass that the model gives as known, and one where it gives none
+    scale = -(fit.model.values.get("m") or 1.0) if based and drivers == (FORCE,) else 1.0
     deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table
     expect(
         bool(drivers) or bool(np.any(deflection)),
         f"{record.name}: no displacement or velocity tells from where it was let go; expected one to plan a release",
     )
-    return PresentTest(source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based)
+    return PresentTest(
+        source, drivers, peaks, bands, f, deflection, len(fit.model.coordinates), based, prepared.every, scale
+    )
 
 
 def _power(values: Floats) -> Floats:
@@ -225,7 +251,7 @@ def possible_designs(
 
 def _driven_within(design: Design, present: PresentTest, limits: Limits) -> bool:
     """Whether the forces of a test are within their limit; where no force drives it, they are."""
-    return present.prescribed or all(float(np.max(np.abs(design.record[f]))) <= limits.force for f in present.drivers)
+    return present.prescribed or present.largest(design.record) <= limits.force
 
 
 def _loudest(
@@ -233,7 +259,7 @@ def _loudest(
 ) -> float:
     """The largest level of a kind of test within the limits, about; zero if none is found."""
     if present.drivers:
-        level = (limits.displacement if present.prescribed else limits.force) / float(np.max(present.peaks))
+        level = (limits.displacement if present.prescribed else limits.force) / present.reached
     else:
         share = reached(make(1.0))
         level = 1.0 / share if 0.0 < share < np.inf else 1.0

@@ -1,6 +1,5 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
-import math
 from collections.abc import Sequence
 
 from study.compare.varying_coefficients import varying_in_words
@@ -12,7 +11,7 @@ from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
-from study.support.numbers import by_chance, enumerated, percent
+from study.support.numbers import by_chance, digits_between, enumerated, percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -193,13 +192,6 @@ def _amount(effect: FittedEffect) -> str:
         for name, value in effect.parameters.items()
     ]
     return f"{said}, with {', '.join(parts)}" if parts else said
-
-
-def digits_between(value: float, width: float) -> int:
-    """Significant digits that tell the ends of an interval apart, four at least."""
-    if value == 0.0 or not 0.0 < width < math.inf:
-        return 4
-    return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
 
 
 def _few(entries: Sequence[ModelTerm]) -> str:

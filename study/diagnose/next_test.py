@@ -29,7 +29,7 @@ from study.identify.time_domain.shape_search import baseline
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.interpolation import between_samples
 from study.records.outputs import Noise
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, OF_THE_GROUND, Record, Sensor
 from study.records.record_layout import Layout
 from study.support import statistics
@@ -38,7 +38,7 @@ from study.support.errors import StudyError, expect
 from study.support.thresholds import K
 from study.way_in.compare_records import made_ready
 
-Doing = Callable[[str], None]  # called with what is done next
+Doing = Callable[[str, int], None]  # called with what is done next, and how many steps are still to come
 DECIDES = 0.95  # probability with which a test is to decide
 WORTH = 0.3  # ... by sensitivities, from which on a test is worth a rehearsal
 
@@ -98,12 +98,13 @@ def next_test(
     *,
     sensors: Sequence[str] = (),
     rehearsals: int = 3,
-    progress: Doing = lambda _: None,
+    progress: Doing | None = None,
 ) -> NextTest:
     """The cheapest test within limits that decides between rivals with ``DECIDES``, or the one that does so best.
 
     Cheap is what needs no further sensor, then no other rig, then what is short, then what is quiet. Up to three tests
-    are rehearsed, so many times with each rival true: the cheapest first, then one that is dearer, then the surest.
+    are rehearsed, so many times with each rival true: the cheapest first, then one that is dearer, then the surest. A
+    repetition of the record's own test is rehearsed once.
 
     ``sensors`` names those that may be added, as ``right displacement``; any if left out.
 
@@ -112,50 +113,54 @@ def next_test(
     StudyError
         If the limits allow no test, or there is no such sensor.
     """
-    progress("comparing tests")
     fits, present, extra = rivals.fits, rivals.present, further_sensors(rivals, sensors)
-    screened = (_screened(rivals, design) for design in allowed(fits, present, limits))
-    found = [choice for choice in screened if choice is not None]
+    if progress:
+        progress("asking how loud tests may be", len(present.kinds))
+    found = _screened(rivals, [(design, None) for design in allowed(fits, present, limits)], progress)
     again = next((c for c in found if c.design.kind == present.kinds[0][0] and c.design.level == 1.0), None)
     asked = len(found)
     found.sort(key=lambda choice: choice.merit, reverse=True)
     good = [choice for choice in found if choice.promise >= DECIDES]
     if good:
-        progress("comparing shorter tests")
-        tried = [d for one in good for d in shorter_designs(fits, present, limits, one.design)]
+        tried = [(d, None) for one in good for d in shorter_designs(fits, present, limits, one.design)]
         asked += len(tried)
-        shorter = [c for d in tried if (c := _screened(rivals, d)) is not None and c.promise >= DECIDES]
+        shorter = [choice for choice in _screened(rivals, tried, progress) if choice.promise >= DECIDES]
         listed = sorted([*good, *shorter], key=lambda choice: choice.design.effort)
-        heard = [listed[0], listed[len(listed) // 2], found[0]]
+        heard = list(dict.fromkeys([listed[0], listed[len(listed) // 2], found[0]]))
     else:
         # what these sensors do not see at all says nothing of which test others would see: the same signal is asked too
         like_this = (choice for choice in found if choice.design.kind == present.kinds[0][0])
         asked_with = list(dict.fromkeys([*found[:4], *islice(like_this, 2)]))
-        further = [_screened(rivals, one.design, sensor) for one in asked_with for sensor in extra]
+        further = [(one.design, sensor) for one in asked_with for sensor in extra]
         asked += len(further)
-        every = [*found, *(choice for choice in further if choice is not None)]
-        heard = list(islice(_different(sorted(every, key=lambda choice: choice.merit, reverse=True)), 3))
-    best = heard[0] if rehearsals or not good else heard[-1]  # without a rehearsal the surest
+        every = sorted([*found, *_screened(rivals, further, progress)], key=lambda c: c.merit, reverse=True)
+        heard = list(islice(_different(every), 3))
+    best = heard[0] if rehearsals or not good else found[0]  # without a rehearsal the surest
     if rehearsals and best.promise >= WORTH:
-        tested = list[Choice]()
+        tested = dict[Choice, Choice]()
         for choice in heard:
-            progress(f"rehearsing the {choice.design.kind}")
-            tested.append(rehearsed(rivals, choice, rehearsals))
-            if tested[-1].promise >= DECIDES:
+            tested[choice] = rehearsed(rivals, choice, rehearsals, progress)
+            if tested[choice].promise >= DECIDES:
                 break
-        best = max(tested, key=lambda choice: choice.merit)
-        again = rehearsed(rivals, again, rehearsals) if again and again.promise >= WORTH else again
+        best = max(tested.values(), key=lambda choice: choice.merit)
+        if again and again.promise >= WORTH:
+            again = tested.get(again) or rehearsed(rivals, again, 1, progress)
     return NextTest(rivals, limits, best, again, asked)
 
 
-def _screened(rivals: Rivals, design: Design, sensor: Sensor | None = None) -> Choice | None:
-    """What a test separates by the rivals' sensitivities; None where one of them does not stay finite."""
-    try:
-        distances = rivals.distances(design, sensor)
-    except StudyError:
-        return None
-    pairs = rivals.decided(distances, alone=sensor is not None)
-    return Choice(design, sensor, pairs, np.min(pairs, axis=1))
+def _screened(rivals: Rivals, tests: Sequence[tuple[Design, Sensor | None]], progress: Doing | None) -> list[Choice]:
+    """What tests separate by the rivals' sensitivities, but those in which one of them does not stay finite."""
+    found = list[Choice]()
+    for number, (design, sensor) in enumerate(tests):
+        if progress:
+            progress("comparing tests", len(tests) - number)
+        try:
+            distances = rivals.distances(design, sensor)
+        except StudyError:
+            continue
+        pairs = rivals.decided(distances, alone=sensor is not None)
+        found.append(Choice(design, sensor, pairs, np.min(pairs, axis=1)))
+    return found
 
 
 def _different(found: Sequence[Choice]) -> Iterator[Choice]:
@@ -185,7 +190,7 @@ def further_sensors(rivals: Rivals, names: Sequence[str] = ()) -> tuple[Sensor, 
     return tuple(found[name] for name in names or found)
 
 
-def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
+def rehearsed(rivals: Rivals, choice: Choice, times: int, progress: Doing | None = None) -> Choice:
     """A test with what it decides when it is simulated, with noise, and judged together with this record.
 
     By how many standard errors a rival leaves more than the true one is normal, with a variance of one or what the
@@ -196,7 +201,9 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int) -> Choice:
     closest = np.zeros(count)
     for true in range(count):
         behind = list[Floats]()
-        for _ in range(times):
+        for time in range(times):
+            if progress:
+                progress(f"rehearsing the {choice.design.kind}", times * (count - true) - time)
             try:
                 record = simulated(rivals, choice, true, rng)
                 behind.append(np.delete(compared_in(rivals, record, true, alone=choice.sensor is not None), true))
@@ -301,16 +308,17 @@ def judged_together(rivals: Rivals, record: Record, *, alone: bool) -> Prepared:
     ]
 
 
-def driving(present: PresentTest, design: Design, prepared: Prepared, mass: float | None) -> dict[str, Floats]:
-    """What drives a test, at the rate at which the record was sampled, shape (n,) each; nothing where it is let go.
+def driving(present: PresentTest, design: Design, every: int) -> dict[str, Floats]:
+    """What drives a test, shape (n,) each, at so many samples to one of the fit; nothing where it is let go.
 
-    Of a single ``mass`` on a moving base that is the base's acceleration.
+    Of a single mass on a moving base that is the base's acceleration.
     """
-    names = present.drivers if design.kind != LET_GO else ()
-    fine = {name: between_samples(design.record[name], prepared.every) for name in names}
-    if FORCE in fine and present.based:
-        return {OF_THE_GROUND: -fine[FORCE] / (mass or 1.0)}
-    return fine
+    if design.kind == LET_GO:
+        return {}
+    names = (OF_THE_GROUND,) if present.based else present.drivers
+    return {
+        name: between_samples(own, every) for name, own in zip(names, present.signals(design.record).T, strict=True)
+    }
 
 
 @lru_cache(maxsize=4)

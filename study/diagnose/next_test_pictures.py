@@ -60,8 +60,8 @@ def next_test_figure(found: NextTest) -> Figure:
 def driving_panel(axes: Axes, found: NextTest) -> Axes:
     """What drives the test along time."""
     record, present = found.choice.design.record, found.rivals.present
-    values = record.columns(present.drivers)
-    factor, unit = _easy(present.source.unit(present.drivers[0]), values)
+    values = present.signals(record)
+    factor, unit = _easy(present.unit, values)
     for own, look in zip(values.T, RIVAL_LOOKS, strict=False):
         axes.plot(record.dt * np.arange(len(record)), own / factor, linewidth=0.7, color=look["color"])
     axes.set_ylabel(f"{'displacement' if present.prescribed else present.driven_by} ({unit})")

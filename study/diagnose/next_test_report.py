@@ -17,7 +17,6 @@ from study.diagnose.precision import PreciseTest
 from study.diagnose.ranked import Ranked
 from study.figures.labels import prefixed
 from study.records.interpolation import between_samples
-from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Floats
 from study.support.extras import undrawn
@@ -46,8 +45,10 @@ def next_test_in_words(found: NextTest) -> str:
             for i in range(len(rows)) for j in range(len(rows))
             if i != j and choice.pairs[i, j] < 0.1
         ]  # fmt: skip
-        if level:
+        if 0 < len(level) <= 3:
             words.append(f"If the first of a pair is true, it would not tell {enumerated(level)}.")
+        elif level:
+            words.append(f"It would not tell {len(level)} of the {len(rows) * (len(rows) - 1)} pairs apart.")
     if not choice.rehearsed and choice.promise >= WORTH:
         words.append("That rests on sensitivities alone: the test cannot be rehearsed together with this record.")
     if choice.sensor is not None:
@@ -99,8 +100,7 @@ def design_in_words(design: Design, present: PresentTest) -> str:
     record = design.record
     if design.kind == LET_GO:
         return f"{_let_go(design, present)}, {design.length:.3g} s"
-    loudest = max(present.drivers, key=lambda d: float(np.max(np.abs(record[d]))))
-    peak = _quantity(float(np.max(np.abs(record[loudest]))), record.unit(loudest))
+    peak = _quantity(present.largest(record), present.unit)
     times = "the same" if design.level == 1.0 else f"{design.level:.2g} times the"
     level = f"at {times} level (largest {present.driven_by} {peak})"
     match design.kind:
@@ -130,7 +130,7 @@ def _let_go(design: Design, present: PresentTest) -> str:
     at = present.source.coordinates[place] if present.coordinates > 1 else ""
     unit = present.source.unit(Sensor(present.source.coordinates[0], MOTIONS[0]))
     how_far = _quantity(float(abs(design.begin[place])), unit)
-    force = _quantity(design.level * float(np.max(present.peaks)), present.source.unit(present.drivers[0]))
+    force = _quantity(design.level * present.reached, present.unit)
     return f"a release from rest under a steady force of {force} ({how_far}{f' at {at}' if at else ''})"
 
 
@@ -194,10 +194,8 @@ def precise_test_fields(found: PreciseTest) -> dict[str, Any]:
 def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
     """A test that decides: what to print, and the content of its files."""
     said, rivals = next_test_in_words(found), found.rivals
-    driven = driving(rivals.present, found.choice.design, rivals.prepared, rivals.fits[0].model.values.get("m"))
-    scale, files = _plan_files(
-        next_test_fields(found) | promise_fields(found), said, found.limits, driven, rivals.prepared
-    )
+    fields = next_test_fields(found) | promise_fields(found)
+    scale, files = _plan_files(fields, said, found.limits, rivals.present, found.choice.design)
     told = f"{pair_table(found)}\n\n{said}{scale}"
     if undrawn():
         return told, files
@@ -208,22 +206,22 @@ def deciding_plan(found: NextTest) -> tuple[str, dict[str, bytes]]:
 
 def precise_plan(found: PreciseTest) -> tuple[str, dict[str, bytes]]:
     """The same of a test for the sake of precision."""
-    said, mass = precise_test_in_words(found), found.fit.model.values.get("m")
-    driven = driving(found.present, found.design, found.prepared, mass)
-    scale, files = _plan_files(precise_test_fields(found), said, found.limits, driven, found.prepared)
+    said = precise_test_in_words(found)
+    scale, files = _plan_files(precise_test_fields(found), said, found.limits, found.present, found.design)
     return f"{said}{scale}", files
 
 
 def _plan_files(
-    fields: Mapping[str, Any], said: str, limits: Limits, driven: Mapping[str, Floats], prepared: Prepared
+    fields: Mapping[str, Any], said: str, limits: Limits, present: PresentTest, design: Design
 ) -> tuple[str, dict[str, bytes]]:
     """What to say of the scale of the WAV file, and ``plan.json``, CSV and WAV of what drives the test, if any does."""
     kept = {"force": limits.force, "displacement": limits.displacement, "seconds": limits.length}
     content = {**fields, "limits": kept, "says": said}
+    driven = driving(present, design, present.every)
     if not driven:
         return "", {"plan.json": as_json(content)}
-    dt = prepared.dt / prepared.every
-    units = {name: prepared.record.units.get(name) or "m/s^2" for name in driven}
+    dt = present.source.dt / present.every
+    units = {name: present.unit if present.based else present.source.unit(name) for name in driven}
     time = dt * np.arange(len(next(iter(driven.values()))))
     head = ",".join(["time [s]", *(f"{name} [{units[name]}]" for name in driven)])
     lines = (",".join(f"{x:.9g}" for x in row) for row in np.column_stack([time, *driven.values()]).tolist())

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from study import __version__
 from study.compare.comparison import Comparison
-from study.compare.fitted_coefficients import Coefficient
+from study.compare.fitted_coefficients import value_and_interval
 from study.diagnose.adding import added_candidate
 from study.diagnose.diagnosis_files import all_names, choices_in_words, diagnosis_in_words
-from study.diagnose.diagnosis_sentences import digits_between, effect_in_words
+from study.diagnose.diagnosis_sentences import effect_in_words
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
@@ -61,7 +61,7 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
         )
     shown = after or before
     rows = [
-        (c.key, term_names(c.term), *_value_and_interval(c), c.unit)
+        (c.key, term_names(c.term), *value_and_interval(c), c.unit)
         for c in shown.coefficients
     ]  # fmt: skip
     return OnePage(
@@ -125,11 +125,3 @@ def _errors(before: Comparison, after: Comparison | None) -> tuple[tuple[str, st
     if all(c.forces for c in both) and not before.prepared.free:
         rows.append(row("power of the force unexplained", [percent(c.force_error) for c in both]))
     return tuple(rows)
-
-
-def _value_and_interval(found: Coefficient) -> tuple[str, str]:
-    if found.interval is None:
-        return f"{found.value:.5g}", "held"
-    low, high = found.interval
-    digits = digits_between(found.value, high - low)
-    return f"{found.value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"

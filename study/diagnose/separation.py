@@ -23,6 +23,7 @@ from study.equations.free_run import prepare
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import covariance_of, linearise
 from study.identify.time_domain.weighted_fit import noise_left
+from study.records.interpolation import largest_between
 from study.records.outputs import Noise, Outputs
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
@@ -94,12 +95,11 @@ class Rivals:
         for j, (other, jacobian) in enumerate(answers):
             columns = outputs.whitened(outputs.stacked(jacobian), noise) / self.size
             rows = np.vstack([columns, self._prior(j, columns.shape[1], further)])
-            for true, _ in answers:
-                target = np.zeros(len(rows))
-                target[: len(columns)] = outputs.whitened(outputs.stacked(true - other), noise) / self.size
-                left = target - rows @ least_squares(rows, target, 1e-9)
-                known = float(np.sum(left[len(columns) :] ** 2))
-                power = block_powers(left[: len(columns)])
+            target = np.zeros((len(rows), len(answers)))
+            for i, (true, _) in enumerate(answers):
+                target[: len(columns), i] = outputs.whitened(outputs.stacked(true - other), noise) / self.size
+            for left in (target - rows @ least_squares(rows, target, 1e-9)).T:
+                power, known = block_powers(left[: len(columns)]), float(np.sum(left[len(columns) :] ** 2))
                 found.append(power + known / len(power))
         return np.array(found).reshape(len(answers), len(answers), -1).transpose(1, 0, 2)
 
@@ -206,12 +206,11 @@ def limit_share(fits: Sequence[FreeRunFit], present: PresentTest, design: Design
     """Largest displacement, and force on a component, over the limits, whichever model is true; infinite if endless."""
     sensors = [Sensor(c, FORCE if present.prescribed else MOTIONS[0]) for c in fits[0].model.coordinates]
     try:
-        largest = max(float(np.max(np.abs(respond(fit, design, sensors)[0]))) for fit in fits)
+        largest = max(largest_between(respond(fit, design, sensors)[0], 4) for fit in fits)
     except StudyError:
         return np.inf
     if present.prescribed:
-        stroke = float(np.max(np.abs(design.record.columns(present.drivers))))
-        return max(largest / limits.force, stroke / limits.displacement)
+        return max(largest / limits.force, present.largest(design.record) / limits.displacement)
     return largest / limits.displacement
 
 
@@ -219,7 +218,7 @@ def own_limits(fits: Sequence[FreeRunFit], present: PresentTest, times: float = 
     """So many times what a record reached, as the models have it, and its length."""
     length = len(present.source) * present.source.dt
     kind, place = present.kinds[0]
-    driven = float(np.max(present.peaks, initial=0.0)) or 1.0
+    driven = present.reached or 1.0
     answered = limit_share(
         fits, present, present.design(kind, place, len(present.source), 1.0), Limits(1.0, np.inf, length)
     )

@@ -17,7 +17,7 @@ from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.part_fit import with_states
-from study.identify.time_domain.shape_search import Baseline, sensitivity
+from study.identify.time_domain.shape_search import CUTOFF, Baseline, sensitivity
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -73,18 +73,20 @@ def best_subsets(
 
 
 def by_sensitivities(
-    parent: FittedCandidate | None, offered: Mapping[str, ModelTerm], base: Baseline, sizes: Sequence[int], most: int
-) -> dict[int, list[SetStart]]:
+    parent: FittedCandidate | None, offered: Mapping[str, ModelTerm], base: Baseline, sizes: Sequence[int], most: int,
+    *, moved: bool = False,
+) -> dict[int, list[SetStart]]:  # fmt: skip
     """By size the sets that promise most by the sensitivities at a fitted set, or at the model itself (None).
 
     What the set has may go and come back; what is new begins at zero. ``offered`` are the effects with shape parameters
-    at which each begins.
+    at which each begins. Where most of a large set go, what stays is ``moved`` to where the sensitivities put it.
     """
     fit = base.fit if parent is None else parent.fit
     members = {} if parent is None else {name: _entry(fit.model, name) for name in parent.names}
     jacobian = with_states(fit, base.prepared)
     owned = {name: [i for i, key in enumerate(fit.keys) if key in entry.keys] for name, entry in members.items()}
-    others = np.delete(jacobian, [i for at in owned.values() for i in at], axis=1)
+    rest = sorted(set(range(jacobian.shape[1])) - {i for at in owned.values() for i in at})
+    others = jacobian[:, rest]
     basis = np.linalg.qr(others / length_or_one(others))[0]
 
     def beyond(columns: Floats) -> Floats:
@@ -92,8 +94,8 @@ def by_sensitivities(
 
     columns = {name: beyond(jacobian[:, at]) for name, at in owned.items()}
     target = fit.residual.copy()
-    for entry in members.values():
-        at = [fit.keys.index(symbol) for symbol in entry.symbols if symbol in fit.keys]
+    amounts = {n: [fit.keys.index(s) for s in entry.symbols if s in fit.keys] for n, entry in members.items()}
+    for at in amounts.values():
         target += jacobian[:, at] @ fit.values[at]
     here = replace(base, fit=fit, basis=basis)
     for name, entry in offered.items():
@@ -108,6 +110,12 @@ def by_sensitivities(
         for name in (n for n in offered if n in names):
             entry = members.get(name) or replace(offered[name], coefficients=(0.0,) * len(offered[name].symbols))
             model = model.with_term(entry)
+        if moved:
+            kept = [i for name in sorted(names) for i in amounts.get(name, [])]
+            change = least_squares(jacobian[:, rest + kept], target, CUTOFF).tolist()
+            own = {i: float(fit.values[i]) if i in rest else 0.0 for i in rest + kept if i < len(fit.keys)}
+            put = dict(zip(rest + kept, change, strict=True))
+            model = model.with_values({fit.keys[i]: value + put[i] for i, value in own.items()})
         return SetStart(names, model, parent)
 
     return _chosen(columns, beyond(target), sizes, most, offered, started)

@@ -6,7 +6,6 @@ the reverse system. Effects come, go and change places with others: what a small
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
@@ -14,9 +13,10 @@ from study.diagnose import set_screening
 from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate, unknowns_of
 from study.diagnose.set_screening import SetStart
 from study.equations.model import ModelTerm
+from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import TRIED, grown_states
 from study.identify.time_domain.part_fit import fit_part
-from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.shape_search import Baseline, Start
 from study.support import statistics
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
@@ -43,22 +43,23 @@ class SetSearch:
 
     def fit(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
-        listed = list(starts)
-        for count, found in enumerate(side_by_side(self._fitted, listed), start=1):
+        listed, before = list(starts), len(self.tried)
+        for count, found in enumerate(side_by_side(self.fitted, listed), start=1):
             if found is not None:
                 names = frozenset(found.names)
                 self.tried[names] = min(found, self.tried.get(names, found), key=by_power)
             if progress is not None:
-                progress(count, len(listed), f"sets of {max(len(start.names) for start in listed)}")
+                progress(before + count, before + len(listed), f"sets of {max(len(start.names) for start in listed)}")
 
-    def _fitted(self, start: SetStart) -> FittedCandidate | None:
+    def fitted(self, start: SetStart, held: Sequence[str] = ()) -> FittedCandidate | None:
+        """One set, fitted with some coefficients held; None where it has no finite motion. Nothing is kept of it."""
         prepared, begun = self.base.prepared, self.base.fit if start.beside is None else start.beside.fit
-        held = begun.held if start.model.modal else self.base.fit.held  # modes that damping does not couple stay so
+        own = begun.held if start.model.modal else self.base.fit.held  # modes that damping does not couple stay so
         try:
             fit = fit_part(
                 start.model,
                 prepared,
-                [k for k in held if k in start.model.values],
+                [*(k for k in own if k in start.model.values), *held],
                 steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
                 max_iterations=TRIED,
                 initial=grown_states(begun, start.model),
@@ -106,6 +107,10 @@ def searched(
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
     try:
         _grow(search, reverse, sizes, done, fewer_than, progress)
+        # of a structure's many places those that were not tried are missing from the whole
+        if not (base.several or done(min(search.tried.values(), key=by_power))):
+            _reduce(search, sizes, progress)
+        _side_valleys(search, sizes)
     except KeyboardInterrupt:  # what was found so far is there to be told
         return replace(search, ended_at=max(map(len, search.tried), default=1))
     return search
@@ -129,14 +134,8 @@ def _grow(
             starts += set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
         if size == 2:
             starts += set_screening.by_sensitivities(None, asked, base, [size], EACH)[size]
-        report = None if progress is None else partial(_counted, progress, len(search.tried))
-        search.fit(starts, report)
-        seen = set[frozenset[str]]()
-        while parents := [p for p in _parents(search.sets(size), simple=simple) if frozenset(p.names) not in seen]:
-            for parent in parents:  # one effect may change places with another
-                exchanged = set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
-                search.fit([start for start in exchanged if start.names not in search.tried], report)
-            seen |= {frozenset(parent.names) for parent in parents}
+        search.fit(starts, progress)
+        _exchange(search, asked, size, simple, progress)
         larger = next(iter(search.sets(size, simple=simple)), None)
         gained = larger is not None and gains(best, larger, len(starts))
         if larger is None or not (gained or patient):
@@ -145,16 +144,87 @@ def _grow(
         best = larger if gained else best
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
+
+
+def _side_valleys(search: SetSearch, sizes: Sequence[int]) -> None:
+    """Fit the best sets without each of their effects: beside others an effect may leave a side valley."""
     for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
-        # beside others an effect may leave a side valley
         search.fit([start_without(best, name) for name in best.names])
         for second in others:
             for name in second.names:
                 search.without(frozenset(second.names), name)
 
 
-def _counted(progress: Progress, before: int, count: int, of: int, what: str) -> None:
-    progress(before + count, before + of, what)
+def _exchange(
+    search: SetSearch, asked: Mapping[str, ModelTerm], size: int, simple: bool, progress: Progress | None
+) -> None:  # fmt: skip
+    """Let one effect of the best sets of a size change places with another until none gains."""
+    seen = set[frozenset[str]]()
+    while parents := [p for p in _parents(search.sets(size), simple=simple) if frozenset(p.names) not in seen]:
+        for parent in parents:
+            exchanged = set_screening.by_sensitivities(parent, asked, search.base, [size], EACH)[size]
+            search.fit([start for start in exchanged if start.names not in search.tried], progress)
+        seen |= {frozenset(parent.names) for parent in parents}
+
+
+def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) -> None:
+    """From above: fit all simple effects at once and flexible ones beside them, then the few that do as much.
+
+    Where several effects act at once a wrong one may stand for two of them, and what is grown on it misses both. Beside
+    all others an effect shows what is its own, and the motion is nearly the true one: there the sensitivities tell
+    which few of them do as much (general to specific, Hendry, 1995).
+    """
+    plain = [c for c in search.tried.values() if not c.flexible]
+    whole = _whole(search, min(plain, key=by_power)) if plain else None
+    if whole is None:
+        return
+    larger = [whole, *_with_shapes(search, whole)]
+    if len(larger) > 1:
+        larger += _with_shapes(search, larger[1])[:1]
+    for every in larger:
+        asked = search.offered | {entry.name: entry for entry in every.fit.model.terms if entry.name in every.names}
+        starts = set_screening.by_sensitivities(every, asked, search.base, sizes, EACH, moved=True)
+        for size in sizes:
+            search.fit(starts[size], progress)
+    shaped = {name: entry for every in larger for name, entry in _flexible(every).items()}
+    for size in sizes:
+        _exchange(search, search.offered | shaped, size, simple=False, progress=progress)
+
+
+def _whole(search: SetSearch, beside: FittedCandidate) -> FittedCandidate | None:
+    """All simple effects at once, begun at the best set of them; None where they have no finite motion."""
+    model, names = beside.fit.model, list(beside.names)
+    for name, entry in search.offered.items():
+        if unknowns_of(entry) == 1 and name not in names:
+            model = model.with_term(replace(entry, coefficients=(0.0,) * len(entry.symbols)))
+            names.append(name)
+    return search.fitted(SetStart(frozenset(names), model, beside))
+
+
+def _with_shapes(search: SetSearch, whole: FittedCandidate) -> list[FittedCandidate]:
+    """The sets with one flexible effect more, of those that promise most; the best two."""
+    base = shape_search.baseline(whole.fit, search.base.prepared)
+    entries = [e for e in search.entries.values() if unknowns_of(e) > 1 and e.name not in whole.names]
+    begun = zip(entries, side_by_side(lambda e: shape_search.shape_starts(e, base), entries), strict=True)
+    promising = sorted((pair for pair in begun if pair[1]), key=lambda pair: -pair[1][0].share)[:3]
+    starts = [(entry, point) for entry, points in promising for point in points[:2]]
+    found = list(filter(None, side_by_side(lambda start: _shaped(search, whole, *start), starts)))
+    best = {c.names: c for c in sorted(found, key=by_power, reverse=True)}  # of two starts the better end
+    return sorted(best.values(), key=by_power)[:2]
+
+
+def _shaped(search: SetSearch, whole: FittedCandidate, entry: ModelTerm, point: Start) -> FittedCandidate | None:
+    """A set with a flexible effect more: fitted with its shape held first, as its misfit has kinks along that."""
+    amounts = point.coefficients or (0.0,) * len(entry.symbols)
+    model = whole.fit.model.with_term(replace(entry, coefficients=amounts, parameters=point.parameters))
+    names, shape = frozenset((*whole.names, entry.name)), entry.keys[len(entry.symbols) :]
+    begun = search.fitted(SetStart(names, model, whole), held=shape)
+    return None if begun is None else search.fitted(SetStart(names, begun.fit.model, begun))
+
+
+def _flexible(found: FittedCandidate) -> dict[str, ModelTerm]:
+    """The flexible effects of a set, as fitted in it."""
+    return {e.name: e for e in found.fit.model.terms if e.name in found.names and unknowns_of(e) > 1}
 
 
 def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:

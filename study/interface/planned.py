@@ -67,13 +67,12 @@ class PlannedTest:
 
         found = self.result
         if isinstance(found, PreciseTest):
-            present, design, prepared, fit = found.present, found.design, found.prepared, found.fit
+            present, design = found.present, found.design
         else:
-            present, design, prepared = found.rivals.present, found.choice.design, found.rivals.prepared
-            fit = found.rivals.fits[0]
-        columns = driving(present, design, prepared, fit.model.values.get("m"))
+            present, design = found.rivals.present, found.choice.design
+        columns = driving(present, design, present.every)
         count = len(next(iter(columns.values()), np.zeros(0)))
-        time = prepared.dt / prepared.every * np.arange(count)
+        time = present.source.dt / present.every * np.arange(count)
         return pd.DataFrame(columns, index=pd.Index(time, name="time"))
 
     def save(self, folder: str | Path) -> None:

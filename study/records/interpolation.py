@@ -42,6 +42,11 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
     return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
 
 
+def largest_between(values: Floats, factor: int) -> float:
+    """Largest absolute value of channels, between their samples too, shape (n, channels); zero of no channel."""
+    return max((float(np.max(np.abs(between_samples(own, factor)))) for own in values.T), default=0.0)
+
+
 def closes(values: Floats) -> bool:
     """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
     # a record that does not close has ten times the energy there of one whose ends are continued

@@ -5,22 +5,25 @@ check raises a ``StudyError`` at the first fault, naming the value and what was 
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
 from study.equations import terms
+from study.equations.layout import LINEAR
 from study.equations.model import Model, free, named_channels
 from study.equations.model_file import read_model
 from study.identify.estimators import ESTIMATORS
 from study.identify.estimators.base import true_parameters
+from study.identify.frequency_domain import reverse_system
 from study.records.excitation import READINGS, SETTINGS, theoretical_autospectrum
 from study.reproduction.settings import (
     CaseSettings,
+    CaseTolerances,
     ExcitationSettings,
     IdentificationSettings,
     Positive,
@@ -39,16 +42,21 @@ Name = Annotated[  # a dot elsewhere is that of a file or of a rule
     str, Field(pattern=r"^[a-z]([a-z0-9_]|(?<=[0-9])[.](?=[0-9]))*\Z", max_length=64, description=NAME)
 ]
 Number = Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(lambda cell: cell or None)]
+Words = Annotated[tuple[str, ...], BeforeValidator(lambda cell: cell.split() if isinstance(cell, str) else cell)]
 RULE = re.compile(r"^\s*(?:use rule \w+ as|rule) (\w+)(?: with)?:", re.MULTILINE)
 JUDGED, KIND = "report", "gaussian_lowpass"  # the force that the claims judge, Section 2.1
 CURVES = ("siso", "miso", "local_polynomial", "instrumental", "output_error")  # have some of every case to be drawn
 LOOKED_AT = (2.0, 4.0)  # hertz: where the claims read single lines, the Dead-Band's and the Mathieu's
 LONGER, INPUTS = 4, 2  # the claims cut segments this many times as long too, and tell so many inputs apart in them
 LINES = 4  # of a segment, that the fit band spans at least
+CLAIMED = ("changed", "by_chance", "error")  # limits of what is claimed of a structure
 
 
-class SimulatedCase(TableRow):
-    """What a row of any table of cases says: a model under a force, and noise on what is measured."""
+class Case(TableRow):
+    """A row of ``config/cases.tsv`` or ``structures.tsv``: a model under a force, and noise on what is measured.
+
+    The numbers are those of the report's figures.
+    """
 
     case: Name
     model: Text
@@ -57,23 +65,20 @@ class SimulatedCase(TableRow):
     noise: Annotated[float, Field(ge=0.0, lt=1.0)]  # mean square on each displacement over its own
     also_assumed: str  # a term that the identification assumes wherever it is not
     title: Text
+    linear: Number = None
+    nonlinear: Number = None
+    coherence: Number = None
+    histogram: Number = None
+    pattern: Number = None
+    autospectrum: Number = None
+    force_history: Number = None
+    force_histogram: Number = None
+    sensors: Words = ()  # coordinates whose displacement alone is measured; all motions of all where there are none
+    modal: Annotated[Literal["", "yes"], Field(description="yes or nothing")] = ""  # the linear part is a sum of modes
 
     @property
     def model_file(self) -> str:
         return f"models/{self.model}.yaml"
-
-
-class Case(SimulatedCase):
-    """One row of ``config/cases.tsv``; the numbers are those of the report's figures."""
-
-    linear: Number
-    nonlinear: Number
-    coherence: Number
-    histogram: Number
-    pattern: Number
-    autospectrum: Number
-    force_history: Number
-    force_histogram: Number
 
     @property
     def figures(self) -> dict[str, str]:
@@ -86,16 +91,15 @@ class Case(SimulatedCase):
         }
 
 
-S = TypeVar("S", bound=CaseSettings[Any])
-C = TypeVar("C", bound=SimulatedCase)
+S = TypeVar("S", bound=CaseSettings[Any], covariant=True)
 
 
 @dataclass(frozen=True)
-class Cases(Generic[S, C]):
+class Cases(Generic[S]):
     """Settings, and cases by name in the order of the table."""
 
     settings: S
-    cases: Mapping[str, C]
+    cases: Mapping[str, Case]
 
     def record_settings(self, case: str) -> RecordSettings:
         """What a case's record depends on; a job re-runs when it changes."""
@@ -103,7 +107,7 @@ class Cases(Generic[S, C]):
         return RecordSettings(
             case=case, excitation=self.settings.excitations[row.excitation], level=row.level, noise=row.noise,
             noise_seed=self.settings.noise_seed if row.noise > 0.0 else None, sampling=self.settings.sampling,
-            integrator=self.settings.integrator,
+            integrator=self.settings.integrator, sensors=row.sensors or None,
         )  # fmt: skip
 
     def identification_settings(self, case: str, estimators: tuple[str, ...] = ()) -> IdentificationSettings:
@@ -119,7 +123,7 @@ class Cases(Generic[S, C]):
         )  # fmt: skip
 
 
-class StudyConfig(Cases[StudySettings, Case]):
+class StudyConfig(Cases[StudySettings]):
     """The report's systems."""
 
     @property
@@ -141,23 +145,52 @@ def load_config(folder: Path) -> StudyConfig:
     settings = read_yaml(source, StudySettings)
     with at(source):
         _check_settings(settings)
-    cases: dict[str, Case] = {}
     stems: dict[str, str] = {}  # of figures, with whose each is
-    taken = dict.fromkeys(
-        ("benchmarks", "part_two", f"estimators_{settings.estimator_errors.many}"), "a folder of results/"
-    )
-    taken |= dict.fromkeys(rules(folder.parent), "a rule")
-    for where, case in read_rows(folder / "cases.tsv", Case):
-        with at(where):
-            expect(case.case not in cases, "the case stands twice; expected each name once")
-            named = taken.get(case.case)
-            expect(not named, f"{case.case!r} is the name of {named}; give the case another")
-            _check_case(case, settings, models, stems)
-        cases[case.case] = case
+    folders = ("benchmarks", "part_two", f"estimators_{settings.estimator_errors.many}")
+    taken = dict.fromkeys(folders, "a folder of results/")
+    cases = _read_cases(folder / "cases.tsv", taken, lambda case: _check_case(case, settings, models, stems))
     with at(source):
         _check_tolerances(settings.tolerances, models, cases)
         _check_claims(settings)
     return StudyConfig(settings, cases)
+
+
+def load_structures(folder: Path, taken: Iterable[str] = ()) -> Cases[CaseSettings[CaseTolerances]]:
+    """Read ``structures.yaml`` and ``structures.tsv`` of a folder, and check the models that they name.
+
+    ``taken`` are the names of other cases.
+    """
+    source = folder / "structures.yaml"
+    settings = read_yaml(source, CaseSettings[CaseTolerances])
+    with at(source):
+        unknown = [name for name in settings.estimators if name not in reverse_system.ESTIMATORS]
+        known = ", ".join(reverse_system.ESTIMATORS)
+        expect(not unknown, f"there is no estimator {unknown[:1]} of structures; known are {known}")
+        expect("miso" in settings.estimators, "estimators lacks 'miso', whose coherences are drawn of every case")
+        low, high = settings.fit_band
+        expect(low < high <= 0.5 / settings.sampling.dt, f"fit_band is [{low:g}, {high:g}]; expected it to rise")
+        expect(
+            set(settings.limits) == set(CLAIMED),
+            f"limits has {', '.join(settings.limits) or 'nothing'}; expected {', '.join(CLAIMED)}",
+        )
+    models = folder.parent / "models"
+    others = dict.fromkeys(taken, "a case of cases.tsv")
+    cases = _read_cases(folder / "structures.tsv", others, lambda case: _check_structure(case, settings, models))
+    return Cases(settings, cases)
+
+
+def _read_cases(path: Path, taken: Mapping[str, str], check: Callable[[Case], None]) -> dict[str, Case]:
+    """Rows of a table of cases, each checked; ``taken`` has names that none may have, and whose each is."""
+    cases: dict[str, Case] = {}
+    taken = {**taken, **dict.fromkeys(rules(path.parents[1]), "a rule")}
+    for where, case in read_rows(path, Case):
+        with at(where):
+            expect(case.case not in cases, "the case stands twice; expected each name once")
+            named = taken.get(case.case)
+            expect(not named, f"{case.case!r} is the name of {named}; give the case another")
+            check(case)
+        cases[case.case] = case
+    return cases
 
 
 def rules(project: Path) -> set[str]:
@@ -171,6 +204,7 @@ def rules(project: Path) -> set[str]:
 
 def _check_settings(settings: StudySettings) -> None:
     """Whether values fit together, and names are known."""
+    expect(not settings.limits, "limits are those of structures.yaml; expected the report's in config/reported.tsv")
     samples, dt, length = settings.sampling.samples, settings.sampling.dt, settings.segments.length
     expect(
         length <= samples,
@@ -223,16 +257,40 @@ def _check_reached(excitation: ExcitationSettings, settings: StudySettings) -> N
 # ---- cases
 
 
-def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[str, str]) -> None:
-    """Whether a case has its model, its force and its figures; ``taken`` holds the stems of the rows before."""
+def _checked_force(case: Case, settings: CaseSettings[Any], models: Path, source: str) -> ExcitationSettings:
+    """A case's excitation; whether its model is there too."""
     path = models / f"{case.model}.yaml"
-    known = ", ".join(sorted(p.stem for p in models.glob("*.yaml")))
-    expect(path.is_file(), f"there is no system {case.model!r}; {models.name}/ holds {known}")
+    beside = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
+    expect(path.is_file(), f"there is no model {case.model!r}; {path.parent.name}/ holds {beside}")
     excitation = settings.excitations.get(case.excitation)
     if excitation is None:
         known = ", ".join(settings.excitations)
-        raise StudyError(f"there is no excitation {case.excitation!r}; config.yaml names {known}")
-    model = _checked_model(path, case.also_assumed, settings)
+        raise StudyError(f"there is no excitation {case.excitation!r}; {source} names {known}")
+    return excitation
+
+
+def _check_structure(case: Case, settings: CaseSettings[Any], models: Path) -> None:
+    """Whether a case has its model and its force, and sensors where its modes need them."""
+    _checked_force(case, settings, models, "structures.yaml")
+    model = read_model(models / f"{case.model}.yaml")
+    expect(model.named, f"{case.model!r} has no 'coordinates'; expected a structure")
+    unknown = [name for name in case.sensors if name not in model.coordinates]
+    expect(not unknown, f"sensors name {unknown[:1]}; {case.model!r} has {', '.join(model.coordinates)}")
+    expect(len(model.forces) == 1, f"{case.model!r} has {len(model.forces)} forces; expected one")
+    if case.also_assumed:
+        terms.get(case.also_assumed)
+    if case.modal:
+        ends = [c for t in model.terms if t.term.name not in LINEAR for c in t.place.moving]
+        needed = dict.fromkeys([*(where for _, where in model.forces), *ends])
+        blind = ", ".join(name for name in needed if name not in case.sensors)
+        expect(not blind, f"sensors lack {blind}, where the force or a nonlinear term acts; expected one")
+
+
+def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[str, str]) -> None:
+    """Whether a case has its model, its force and its figures; ``taken`` holds the stems of the rows before."""
+    excitation = _checked_force(case, settings, models, "config.yaml")
+    model = _checked_model(models / f"{case.model}.yaml", case.also_assumed, settings)
+    expect(not case.sensors and not case.modal, "sensors and modal are for structures.tsv; expected neither")
     needed, periods = settings.settle_periods + 4, excitation.periods or 1
     expect(
         "errors_in_variables" not in settings.estimators or periods >= needed,

@@ -196,6 +196,7 @@ class CaseSettings(Section, Generic[T]):
     settle_periods: Seed = 0  # of a force that repeats
     estimators: Names
     tolerances: T
+    limits: Limits = Field(default_factory=dict[str, Positive])  # of what is claimed of a structure, each by its name
 
 
 class StudySettings(CaseSettings[Tolerances]):

@@ -3,23 +3,28 @@
 Where nothing drives a coordinate, its A_j(f) are over the own mass; tables have them times the true one, in N.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from study.compare.comparison import Comparison
+from study.equations.layout import LINEAR
 from study.equations.linear_part import modes_of, transfer
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model
+from study.identify.frequency_domain.action_reaction import JointEstimate, joint_estimate
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
-from study.identify.frequency_domain.reverse_system import exact_responses
+from study.identify.frequency_domain.reverse_system import ReverseSystem, equations_of, exact_responses, reverse_system
+from study.records.prepared import prepare_record
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
+from study.reproduction.cases import assumed_model, estimator_settings
 from study.reproduction.claims.judgement import SEPARATOR, Condition, verdict
 from study.reproduction.settings import IdentificationSettings
-from study.reproduction.structure_cases import CaseResult, ClaimLimits
 from study.reproduction.tables import (
     COHERENCE_COLUMNS,
     PARAMETER_COLUMNS,
@@ -28,6 +33,7 @@ from study.reproduction.tables import (
     stacked,
 )
 from study.support.arrays import Complexes, Floats
+from study.support.errors import StudyError
 from study.support.numbers import percent
 
 WHERE = ["equation", "place"]  # what the tables of structures have beside
@@ -47,6 +53,37 @@ STATEMENTS = {
 
 
 # ---- equation by equation
+
+
+@dataclass(frozen=True, eq=False)
+class EquationsFound:
+    """What one estimator finds: equation by equation, and of all equations together."""
+
+    system: ReverseSystem
+    joint: JointEstimate
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """A case in reverse."""
+
+    model: Model  # that is assumed, with the true values: zero of what the structure does not have
+    found: Mapping[str, EquationsFound]  # by estimator
+
+
+def identify_equations(model: Model, record: Record, settings: IdentificationSettings) -> CaseResult:
+    """Every equation of a structure by every estimator of the settings."""
+    assumed = assumed_model(model, settings.also_assumed)
+    assumed = assumed.with_values({key: value or 0.0 for key, value in assumed.values.items()})
+    equations, _ = equations_of(assumed, prepare_record(record), (0, len(record)))
+    found: dict[str, EquationsFound] = {}
+    for name in settings.estimators:
+        system = reverse_system(name, equations, record.dt, estimator_settings(settings))
+        try:
+            found[name] = EquationsFound(system, joint_estimate(system))
+        except StudyError as error:
+            raise StudyError(f"{settings.case}, {name}: {error}") from None
+    return CaseResult(assumed, found)
 
 
 def input_place(item: Input) -> str:
@@ -116,6 +153,13 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
 
 
 # ---- by modes
+
+
+def modal_model(model: Model, sensors: Sequence[str]) -> Model:
+    """The nonlinear terms of a structure alone, their coefficients open, between its sensors, beside its modes."""
+    kept = tuple(t for t in model.terms if t.term.name not in LINEAR)
+    opened = tuple(t.with_values(dict.fromkeys(t.symbols)) for t in kept)
+    return Model(f"{model.name} as measured", opened, tuple(sensors), model.forces, ModalPart(tuple(sensors)))
 
 
 def modal_parameters(truth: Model, comparison: Comparison, settings: IdentificationSettings) -> pd.DataFrame:
@@ -190,26 +234,26 @@ def transfer_functions(
 
 
 def structure_claims(
-    record: Record, result: CaseResult, settings: IdentificationSettings, limits: ClaimLimits
+    record: Record, result: CaseResult, settings: IdentificationSettings, limits: Mapping[str, float]
 ) -> pd.DataFrame:
     """Every claim on a case, a row each: what must hold, what was measured, the verdict."""
     return _judged(
         settings.case,
-        transfer_functions=_changed(result.model, record, settings, limits.changed),
+        transfer_functions=_changed(result.model, record, settings, limits["changed"]),
         placed=_placed(structure_parameters(result, settings), "miso"),
-        reaction=_reaction(result, limits.by_chance),
+        reaction=_reaction(result, limits["by_chance"]),
     )
 
 
 def modal_claims(
-    truth: Model, comparison: Comparison, settings: IdentificationSettings, limits: ClaimLimits, noise: float
+    truth: Model, comparison: Comparison, settings: IdentificationSettings, limits: Mapping[str, float], noise: float
 ) -> pd.DataFrame:
     """The same of a case whose linear part is a sum of modes; ``noise`` is the mean square on the response."""
     found = modal_parameters(truth, comparison, settings)
     coefficients = found[found["parameter"].isin(c.key for c in comparison.coefficients)]
     least, error = float(np.sqrt(noise / (1.0 + noise))), comparison.prediction.error
-    criterion = f"error of the free run at most {limits.error:g} times the noise of {percent(least)}"
-    runs_free = Condition(criterion, f"error {percent(error)}", error <= limits.error * least)
+    criterion = f"error of the free run at most {limits['error']:g} times the noise of {percent(least)}"
+    runs_free = Condition(criterion, f"error {percent(error)}", error <= limits["error"] * least)
     return _judged(settings.case, measured=[*_placed(coefficients, BY_MODES), runs_free])
 
 

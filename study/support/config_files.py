@@ -63,7 +63,10 @@ def read_yaml(path: Path, kind: type[S]) -> S:
 
 
 def read_rows(path: Path, kind: type[R]) -> list[tuple[str, R]]:
-    """Rows of a tab-separated table, each with the words that say where it stands, counted as an editor does."""
+    """Rows of a tab-separated table, each with the words that say where it stands, counted as an editor does.
+
+    A column whose field has a default may be left out.
+    """
     text = read_text(path, "a table with tabs between its cells").removeprefix("\ufeff")  # a spreadsheet's mark
     lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if len(lines) < 2:
@@ -74,7 +77,7 @@ def read_rows(path: Path, kind: type[R]) -> list[tuple[str, R]]:
             raise StudyError(f"{path}: its heading names {name!r}, which is no column; expected {', '.join(known)}")
         if heading.count(name) > 1:
             raise StudyError(f"{path}: its heading names {name!r} twice; expected each column once")
-    if lacking := [name for name in known if name not in heading]:
+    if lacking := [name for name, field in kind.model_fields.items() if field.is_required() and name not in heading]:
         raise StudyError(f"{path}: its heading lacks the column {lacking[0]!r}; expected {', '.join(known)}")
     rows: list[tuple[str, R]] = []
     for number, line in lines[1:]:

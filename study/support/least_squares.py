@@ -15,7 +15,7 @@ _lstsq, _pinv = cast(Any, np.linalg.lstsq), cast(Any, np.linalg.pinv)  # their a
 
 
 def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -> Floats:
-    """Amounts of the columns that approximate the target best, shape (columns,).
+    """Amounts of the columns that approximate the target best, shape (columns,); of several targets (columns, targets).
 
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
@@ -24,7 +24,7 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -
     peak = np.where(peak > least, peak, np.inf)  # first, so that no square overflows
     scale = peak * length_or_one(columns / peak)
     amounts: Floats = np.asarray(_lstsq(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
-    return amounts / scale
+    return (amounts.T / scale).T
 
 
 def pseudo_inverse(columns: Floats, cutoff: float = INDISTINCT) -> Floats:
@@ -73,8 +73,9 @@ def normal_inverse(normal: Floats, size: Floats | None = None) -> Floats:
 
 
 def length_or_one(columns: Floats | Complexes) -> Floats:
-    """Length of each column, one where it is zero."""
-    length = np.linalg.norm(columns, axis=0)
+    """Length of each column, one where it is zero; of one so long that its square overflows, infinity."""
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(columns, axis=0)
     return np.where(length > 0.0, length, 1.0)
 
 

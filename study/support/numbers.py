@@ -22,6 +22,13 @@ def percent(share: float, form: str = ".3g", error: float | None = None, error_f
     return f"{100.0 * share:{form}}{spread} %"
 
 
+def digits_between(value: float, width: float) -> int:
+    """Significant digits that tell the ends of an interval apart, four at least."""
+    if value == 0.0 or not 0.0 < width < math.inf:
+        return 4
+    return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
+
+
 def by_chance(p_value: float) -> str:
     """A p value in words: in how many records chance alone would do as much."""
     if p_value < RARE:

@@ -67,7 +67,7 @@ def _decided(trial: Trial, rivals: Rivals, choice: Choice, rng: np.random.Genera
 def measured_in(trial: Trial, rivals: Rivals, choice: Choice, rng: np.random.Generator) -> Record:
     """The record of a test of the true model, with the noise that the trial has."""
     design, prepared, given = choice.design, rivals.prepared, trial.record
-    driven = driving(rivals.present, design, prepared, trial.truth.values.get("m"))
+    driven = driving(rivals.present, design, prepared.every)
     samples = prepared.every * (len(design.record) - 1) + 1
     moves = [m for m in MOTIONS if m in design.record] if rivals.present.prescribed else []
     acting = {name: np.zeros(samples) for name in given.forces}

@@ -195,6 +195,10 @@ def _is(column: str) -> Score:
     return lambda row: float(str(row[column]) in ("True", "1", "1.0"))
 
 
+def _is_not(column: str) -> Score:
+    return lambda row: 1.0 - _is(column)(row)
+
+
 def _number(column: str) -> Score:
     return lambda row: float(row[column])
 
@@ -304,10 +308,12 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   "sure"),
             Reach("... where 80 to 95 % was promised", _promised(0.8, 0.95), _is("decided"), "likely"),
             Reach("... where less was promised", _promised(WORTH, 0.8), _is("decided")),
-            Reach("... where 80 % or more was promised, after a random test that is allowed and as long",
-                  _promised(0.8), _is("random_decided")),
-            Reach("all ties for which a test is proposed, after that", _promised(WORTH), _is("decided")),
-            Reach("... after a random test that is allowed and as long", _promised(WORTH), _is("random_decided")),
+            Reach("ties left undecided, where 80 % or more was promised", _promised(0.8), _is_not("decided")),
+            Reach("... after a random test that is allowed and as long", _promised(0.8), _is_not("random_decided")),
+            Reach("ties left undecided, of all for which a test is proposed", _promised(WORTH), _is_not("decided")),
+            Reach("... after a random test as above", _promised(WORTH), _is_not("random_decided")),
+            Reach("ties that one of these two tests decides and the other does not: decided by the proposed one",
+                  lambda r: _promised(WORTH)(r) and _is("decided")(r) != _is("random_decided")(r), _is("decided")),
             Reach("ties of which it is said that no allowed test is likely to decide", _promised(0.0),
                   lambda r: float(r["promise"] < WORTH)),
             Reach("mean size of the promise, where 80 to 95 % was promised", _promised(0.8, 0.95), _number("promise"),

@@ -1,13 +1,18 @@
 """A single mass is a structure with one coordinate: records told once without and once with names of everything."""
 
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from study.compare.comparison import Comparison, compare
+from study.compare.comparison_report import as_json, comparison_document
 from study.diagnose.adding import added
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.verdict import Diagnosis, diagnose
 from study.equations.model import Model, free
 from study.equations.place import Place
@@ -148,6 +153,45 @@ def test_the_diagnosis_is_the_same(pair: Told) -> None:
         assert b.effect.coefficient == pytest.approx(a.effect.coefficient, rel=1e-3)
         assert b.effect.unit == a.effect.unit
     assert one.candidates[0].term.name == "cubic_stiffness"
+
+
+def leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value of a document with where it stands, labels taken off its words."""
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield from leaves(value, f"{path}.{key}" if path else key)
+    elif isinstance(content, list):
+        for k, value in enumerate(content):
+            yield from leaves(value, f"{path}.{k}")
+    else:
+        path, words = (re.sub(r"\[(ground-)?x\]|\bx(:)? (?=displacement|velocity|acceleration)", "", t)
+                       for t in (path, content if isinstance(content, str) else ""))  # fmt: skip
+        yield path, words.replace("shaker", "force") if isinstance(content, str) else content
+
+
+# What documents of a single mass and of a structure tell in other words: its equation, and sentences that name
+# places; what is left of the force, by coordinate; sizes, by sensor; and the envelope of one decay.
+TOLD_OTHERWISE = re.compile(
+    r"model[.](equation|terms)|says$|error(_of_fitted_coefficients)?[.]force$|noise_floor[.](force|response_error|from)"
+    r"|rms[.]|above_noise[.]standard_errors|decay[.]|.*tied_with[.]|where[.]frequency[.]"
+)
+
+
+def test_the_json_is_the_same_but_for_labels(pair: Told) -> None:
+    for one, other in (
+        [as_json(comparison_document([c])) for c in pair.comparisons],
+        [diagnosis_files(d, "")["diagnosis.json"] for d in pair.diagnoses],
+    ):
+        named_ones, count = dict(leaves(json.loads(other))), 0
+        for path, value in leaves(json.loads(one)):
+            if TOLD_OTHERWISE.match(path):
+                continue
+            again, count = named_ones[path], count + 1
+            if isinstance(value, float) and again is not None:
+                assert again == pytest.approx(value, rel=1e-3, abs=1e-6), path
+            else:
+                assert again == value, path
+        assert count > 20
 
 
 def test_a_structure_of_one_coordinate_is_compared_and_added_to_like_a_mass() -> None:

@@ -57,7 +57,7 @@ class Bench:
         self.fitted: list[tuple[str, str | None]] = []  # each set, and the smaller one that it began beside
         self.asked: list[tuple[str | None, int]] = []  # sets beside which others were asked for, and of which size
         self.proposed: Callable[[frozenset[str], int], Sequence[Iterable[str]]] = self.every
-        monkeypatch.setattr(SetSearch, "_fitted", lambda _, start: self.fit(start))
+        monkeypatch.setattr(SetSearch, "fitted", lambda _, start: self.fit(start))
         monkeypatch.setattr(set_screening, "by_sensitivities", self.by_sensitivities)
         monkeypatch.setattr(set_screening, "by_the_reverse_system", lambda *_: {})
 
@@ -70,7 +70,9 @@ class Bench:
     def every(_: frozenset[str], size: int) -> Sequence[Iterable[str]]:
         return list(combinations(NAMES, size))
 
-    def by_sensitivities(self, parent: Any, offered: Any, _base: Any, sizes: Sequence[int], _most: int) -> Any:
+    def by_sensitivities(
+        self, parent: Any, offered: Any, _base: Any, sizes: Sequence[int], _most: int, **_: bool
+    ) -> Any:
         names = frozenset[str]() if parent is None else frozenset(parent.names)
         self.asked += [(None if parent is None else parent.name, size) for size in sizes]
         model: Any = None
@@ -80,12 +82,13 @@ class Bench:
         }
 
     def search(
-        self, *, done: bool = False, fewer_than: int | None = None, lost: str = "", progress: Any = None
-    ) -> SetSearch:
-        """``lost`` are effects whose fit alone has no finite motion."""
+        self, *, done: bool = False, fewer_than: int | None = None, lost: str = "", progress: Any = None,
+        from_above: bool = False,
+    ) -> SetSearch:  # fmt: skip
+        """``lost`` are effects whose fit alone has no finite motion; of many places no whole is asked for."""
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES if name not in lost]
         not_alone = [effect(name) for name in lost]
-        base: Any = None
+        base: Any = SimpleNamespace(several=not from_above)
         return searched(base, singles, [], not_alone, lambda _: done, fewer_than, progress)
 
     def sizes(self) -> set[int]:
@@ -283,7 +286,7 @@ def test_of_a_set_that_is_fitted_again_the_better_fit_stays_and_an_unphysical_on
     search = SetSearch(nothing, {}, {})
     ends = iter([candidate("ab", {"c": 0.5}), candidate("ab", {}), candidate("ab", {"c": 1.0})])
     start = SetStart(frozenset("ab"), nothing)
-    object.__setattr__(search, "_fitted", lambda _: next(ends))
+    object.__setattr__(search, "fitted", lambda _: next(ends))
     kept: list[float] = []
     for _ in range(3):
         search.fit([start])
@@ -300,3 +303,22 @@ def test_a_gain_is_judged_by_how_many_sets_were_asked_for():
     assert gains(smaller, larger, 1)
     assert not gains(smaller, larger, 10**9)
     assert not gains(larger, smaller, 1)
+
+
+def test_what_grows_astray_is_found_from_above(monkeypatch: pytest.MonkeyPatch):
+    """The smaller sets ask for wrong effects; beside all of them at once the right four show."""
+
+    def astray(parent: frozenset[str], size: int) -> Sequence[Iterable[str]]:
+        return ["abcd"[:size]] if parent == set(NAMES) else [s for s in combinations(NAMES, size) if "d" not in s]
+
+    def found(*, from_above: bool) -> tuple[str, list[str | None]]:
+        bench = Bench(monkeypatch, hidden("abcd"))
+        bench.proposed = astray
+        search = bench.search(from_above=from_above)
+        return best(search, 4), [beside for names, beside in bench.fitted if names == "abcd"]
+
+    every = candidate(NAMES, {})
+    monkeypatch.setattr(set_search, "_whole", lambda *_: every)
+    monkeypatch.setattr(set_search, "_with_shapes", lambda *_: [])
+    assert found(from_above=False)[0] != "abcd"
+    assert found(from_above=True) == ("abcd", [every.name])

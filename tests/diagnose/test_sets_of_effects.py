@@ -14,6 +14,8 @@ from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, Diagnosis
 from study.equations.terms import LIBRARY
 from study.trials.draw import Trial, make_trial
+from study.trials.findings import compared
+from study.trials.runs import rig_orders
 from study.way_in.compare_records import compare_records
 
 HIDDEN = ("quadratic_stiffness", "coulomb_friction", "cubic_damping")
@@ -133,6 +135,17 @@ def test_three_hidden_effects_are_named_together_with_their_coefficients(rig: Tr
         assert abs(effect.coefficient - true[effect.entry.symbols[0]]) < 3.0 * effect.error
         assert effect.error < 0.02 * abs(effect.coefficient)
         assert effect.idle == ""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [780065, 780084], ids=["blows", "stepped"])
+def test_what_grows_astray_from_wrong_effects_is_found_beside_all_of_them(seed: int):
+    """Curved springs stood for a loop, and others for a force that is periodic in position."""
+    order = next(one for one in rig_orders() if one.seed == seed)
+    trial = make_trial(order.seed, order.hidden, order.noise, order.response, test=order.test)
+    answer = diagnose_accounted(compared(trial, trial.believed)).diagnosis.answer
+    assert answer is not None
+    assert set(answer.names) == set(trial.hidden)
 
 
 @pytest.mark.long

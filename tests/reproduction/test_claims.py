@@ -82,7 +82,13 @@ def test_verdict_counts_conditions(met: list[bool], said: str) -> None:
 
 
 def one_statement() -> Reported:
-    return Reported({"a": Statement(id="a", where="p. 1", what="it is so", value=3.0, unit="Hz")})
+    return Reported(
+        {
+            "a": Statement(
+                id="a", where="p. 1", what="it is so", value=3.0, unit="Hz", systems="", levels="", holds_if="", why=""
+            )
+        }
+    )
 
 
 def test_a_claim_that_holds_needs_no_reason() -> None:

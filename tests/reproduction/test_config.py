@@ -73,6 +73,15 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
     }
 
 
+def test_a_case_of_one_mass_has_neither_sensors_nor_limits_of_a_structure(folder):
+    table = (folder / "cases.tsv").read_text().splitlines()
+    (folder / "cases.tsv").write_text("\n".join([f"{table[0]}\tsensors", *(f"{row}\tfirst" for row in table[1:])]))
+    assert "sensors and modal are for structures.tsv" in refused(folder)
+    with (folder / "config.yaml").open("a") as settings:
+        settings.write("limits: {changed: 0.05}\n")
+    assert "limits are those of structures.yaml" in refused(folder)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -131,7 +140,7 @@ def test_faults_of_the_settings(folder, old, new, says):
 @pytest.mark.parametrize(
     ("new", "says"),
     [
-        (ROW.replace("duffing\treport", "dufing\treport"), "there is no system 'dufing'; models/ holds dead_band"),
+        (ROW.replace("duffing\treport", "dufing\treport"), "there is no model 'dufing'; models/ holds dead_band"),
         (ROW.replace("report", "reprot"), "there is no excitation 'reprot'; config.yaml names report"),
         (ROW.replace("1.0", "-1.0"), "level is '-1.0'; expected a number above 0"),
         (ROW.replace("1.0", "one"), "level is 'one'; expected a number"),

@@ -12,10 +12,12 @@ from study.compare.comparison import compare
 from study.equations.model_file import read_model
 from study.records.prepared import prepare_record
 from study.reproduction.cases import assumed_model, make_record
-from study.reproduction.structure_cases import identify_equations, load_structures, modal_model
+from study.reproduction.config import load_structures
 from study.reproduction.structure_figures import coherence_figure, connections_figure, modal_figure
 from study.reproduction.structure_tables import (
+    identify_equations,
     modal_claims,
+    modal_model,
     modal_parameters,
     modal_responses,
     structure_claims,
@@ -38,7 +40,7 @@ def shortened(samples, **of_segments):
     return replace(study, settings=own.model_copy(update={"sampling": sampling, "segments": cut}))
 
 
-LIMITS = load_structures(ROOT / "config").settings.claims
+LIMITS = load_structures(ROOT / "config").settings.limits
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +115,14 @@ def test_a_bad_row_is_named(tmp_path, old, new, said):
     assert old in text
     table.write_text(text.replace(old, new, 1))
     with pytest.raises(StudyError, match=said):
+        load_structures(tmp_path / "config")
+
+
+def test_a_limit_that_is_lost_is_named(tmp_path):
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    settings = tmp_path / "config" / "structures.yaml"
+    settings.write_text(settings.read_text().replace("by_chance: 0.01, ", ""))
+    with pytest.raises(StudyError, match="limits has changed, error; expected changed, by_chance, error"):
         load_structures(tmp_path / "config")
 
 

@@ -239,7 +239,7 @@ def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp
 @pytest.mark.parametrize(
     ("file", "old", "new", "says"),
     [
-        ("cases.tsv", "\tduffing\treport", "\tdufing\treport", "row 2 (case 'duffing'): there is no system 'dufing'"),
+        ("cases.tsv", "\tduffing\treport", "\tdufing\treport", "row 2 (case 'duffing'): there is no model 'dufing'"),
         ("config.yaml", "length: 256", "length: 4096", "segments.length is 4096, longer than the record of 2048"),
         ("cases.tsv", "duffing\tduffing", "claims\tduffing", "row 2 (case 'claims'): 'claims' is the name of a rule"),
         ("cases.tsv", "duffing\tduffing", "all\tduffing", "row 2 (case 'all'): 'all' is the name of a rule"),

@@ -73,10 +73,10 @@ class Statement(TableRow):
     what: Text  # the statement in a sentence, or what the number is
     value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]  # the number
     unit: str  # its unit
-    systems: Words = ()  # of Table 1: each must meet the conditions, all of them together where there are several
-    levels: Words = ()  # likewise, of ``INPUT_VARIANCES``; at unit variance if there is none
-    holds_if: Annotated[tuple[Stated, ...], BeforeValidator(_stated)] = ()
-    why: str = ""  # the reason, in case a condition is not met
+    systems: Words  # of Table 1: each must meet the conditions, all of them together where there are several
+    levels: Words  # likewise, of ``INPUT_VARIANCES``; at unit variance if there is none
+    holds_if: Annotated[tuple[Stated, ...], BeforeValidator(_stated)]
+    why: str  # the reason, in case a condition is not met
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
