@@ -7,13 +7,15 @@ import ast
 import multiprocessing
 import runpy
 from collections.abc import Iterable, Mapping
+from multiprocessing.connection import wait
 from pathlib import Path
+from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 
 from study.support.errors import StudyError
 
-FORKS = multiprocessing.get_context("forkserver")
+FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
 
 
 def preload(scripts: Iterable[str]) -> None:
@@ -34,8 +36,11 @@ def run_forked(script: str, step: Mapping[str, Any]) -> None:
         If the script ends with another exit code than 0; it has then said why.
     """
     process = FORKS.Process(target=run_here, args=(script, step))
-    process.start()
-    process.join()
+    with ASKING:  # to start one also asks how others ended, and that is told once
+        process.start()
+    wait([process.sentinel])
+    with ASKING:
+        process.join()
     if process.exitcode:
         raise StudyError(f"{script} ended with exit code {process.exitcode}")
 
