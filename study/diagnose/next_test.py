@@ -203,7 +203,7 @@ def rehearsed(rivals: Rivals, choice: Choice, times: int, progress: Doing | None
         behind = list[Floats]()
         for time in range(times):
             if progress:
-                progress(f"rehearsing the {choice.design.kind}", times * (count - true) - time)
+                progress(f"rehearsing ({choice.design.kind})", times * (count - true) - time)
             try:
                 record = simulated(rivals, choice, true, rng)
                 behind.append(np.delete(compared_in(rivals, record, true, alone=choice.sensor is not None), true))
