@@ -169,8 +169,9 @@ def leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, words.replace("shaker", "force") if isinstance(content, str) else content
 
 
-# What documents of a single mass and of a structure tell in other words: its equation, and sentences that name
-# places; what is left of the force, by coordinate; sizes, by sensor; and the envelope of one decay.
+# What is not yet the same. In other words: the equation, sentences that name places, sizes by sensor. In content: a
+# structure's error of the force is what its equation of motion leaves by coordinate, not what no linear system of
+# its terms explains; and it has no noise floor of the force, no band of frequencies, and no envelope of a decay.
 TOLD_OTHERWISE = re.compile(
     r"model[.](equation|terms)|says$|error(_of_fitted_coefficients)?[.]force$|noise_floor[.](force|response_error|from)"
     r"|rms[.]|above_noise[.]standard_errors|decay[.]|.*tied_with[.]|where[.]frequency[.]"
