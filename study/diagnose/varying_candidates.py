@@ -140,6 +140,21 @@ def as_smooth(candidate: FittedCandidate, prepared: Prepared) -> FittedCandidate
         return candidate
 
 
+def without_needless(smooth: FittedCandidate, prepared: Prepared) -> FittedCandidate:
+    """A set whose changes bend by now, without the effects that stood for what its lines could not."""
+    for entry in (e for e in smooth.entries if e.term.variation is None):
+        model = smooth.fit.model.without_term(entry.name)
+        held, steps = [key for key in smooth.fit.held if key in model.values], smooth.fit.steps_per_sample
+        try:
+            fit = finished(fit_part(model, prepared, held, steps=steps), prepared)
+        except StudyError:
+            continue
+        fewer = judged_candidate(tuple(e for e in smooth.entries if e is not entry), fit, prepared)
+        if fewer and statistics.worse(fewer.prediction.residual, smooth.prediction.residual) < K:
+            smooth = fewer
+    return smooth
+
+
 def simplest(tried: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     """Of the shapes in which one coefficient may change, the simplest that leaves no more than the best does."""
     groups: dict[tuple[object, ...], list[FittedCandidate]] = {}

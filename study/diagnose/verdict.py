@@ -296,6 +296,7 @@ def _smooth(decision: _Decision, comparison: Comparison, asked: int) -> _Decisio
     again = varying_candidates.as_smooth(answer, comparison.prepared)
     if again is answer:
         return decision
+    again = varying_candidates.without_needless(again, comparison.prepared)
     row = replace(rank([again], comparison, asked)[0], tied_with=answer.tied_with, distance=answer.distance)
     rows, sets = ([row if r is answer else r for r in listed] for listed in (decision.rows, decision.sets))
     return replace(decision, rows=rows, sets=sets)
