@@ -190,11 +190,12 @@ def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     columns: dict[str, list[Floats]] = {}
     target: list[Floats] = []
     for first, last in part.runs((0, len(part))):
-        if not np.any(part["force"][first:last]):  # between blows, where no line is driven
-            continue
         taper = np.hanning(last - first + 1)[:-1]
+        tapered = taper * part["force"][first:last]
+        if not np.any(tapered):  # between blows, or where one has just ended: no line is driven
+            continue
         frequency = np.asarray(rfftfreq(last - first, part.dt))
-        force = np.asarray(rfft(taper * part["force"][first:last]))
+        force = np.asarray(rfft(tapered))
         loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
         keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
         weight = base.paths(last - first)[keep, 0, 0]
