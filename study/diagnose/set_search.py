@@ -186,7 +186,8 @@ def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) 
         starts = set_screening.by_sensitivities(every, asked, search.base, sizes, EACH, moved=True)
         for size in sizes:
             search.fit(starts[size], progress)
-    shaped = {name: entry for every in larger for name, entry in _flexible(every).items()}
+    found = [(every.names, entry) for every in larger for entry in every.fit.model.terms]
+    shaped = {entry.name: entry for names, entry in found if entry.name in names and unknowns_of(entry) > 1}
     for size in sizes:
         _exchange(search, search.offered | shaped, size, simple=False, progress=progress)
 
@@ -220,11 +221,6 @@ def _shaped(search: SetSearch, whole: FittedCandidate, entry: ModelTerm, point: 
     names, shape = frozenset((*whole.names, entry.name)), entry.keys[len(entry.symbols) :]
     begun = search.fitted(SetStart(names, model, whole), held=shape)
     return None if begun is None else search.fitted(SetStart(names, begun.fit.model, begun))
-
-
-def _flexible(found: FittedCandidate) -> dict[str, ModelTerm]:
-    """The flexible effects of a set, as fitted in it."""
-    return {e.name: e for e in found.fit.model.terms if e.name in found.names and unknowns_of(e) > 1}
 
 
 def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:
