@@ -16,6 +16,32 @@ enum { WIDEST = 12 };               /* of the widths that are written out */
 static const double ZERO = 0.0;
 
 /*
+ * Where a motion dies away its derivatives fall below 1e-308, where a number has no full mantissa any more and an
+ * operation takes up to a hundred times as long. While this runs such a number is zero.
+ */
+#if defined(__SSE2__) || defined(_M_X64)
+#include <xmmintrin.h>
+typedef unsigned int Rounding;
+static Rounding rounding(void) { return _mm_getcsr(); }
+static void set_rounding(Rounding mode) { _mm_setcsr(mode); }
+#define TINY_IS_ZERO 0x8040 /* what comes out, what goes in */
+#elif defined(__aarch64__) && defined(__GNUC__)
+typedef uint64_t Rounding;
+static Rounding rounding(void) {
+    Rounding mode;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(mode));
+    return mode;
+}
+static void set_rounding(Rounding mode) { __asm__ volatile("msr fpcr, %0" : : "r"(mode)); }
+#define TINY_IS_ZERO 0x1000000
+#else
+typedef int Rounding;
+static Rounding rounding(void) { return 0; }
+static void set_rounding(Rounding mode) { (void)mode; }
+#define TINY_IS_ZERO 0
+#endif
+
+/*
  * The functions below are written out for each small width: the compiler then leaves out the loops over a row and keeps
  * it in the processor's registers.
  */
@@ -343,6 +369,8 @@ EXPORT int64_t integrate(
     int64_t begin = bounds[runs - 1], end = bounds[runs] + 1 < samples ? bounds[runs] + 1 : samples;
     size_t of_row = (size_t)columns * sizeof(double);
     double *last = malloc((size_t)((end - begin) * of_sample + 1) * sizeof(double));
+    Rounding before = rounding();
+    set_rounding(before | TINY_IS_ZERO);
     if (last && prepare_motion(&m, code, count, split, inputs, first, r, slots, slot_width)) {
         failed = ALL_FINITE;
         for (int64_t i = 0; i < runs && failed == ALL_FINITE; i++) {
@@ -358,6 +386,7 @@ EXPORT int64_t integrate(
         if (failed == ALL_FINITE)
             memcpy(out + begin * of_sample, last, (size_t)((bounds[runs] - begin) * of_sample) * sizeof(double));
     }
+    set_rounding(before);
     free(last);
     forget_motion(&m);
     return failed;
