@@ -65,20 +65,20 @@ def needed_restarts(
     unit = block_diag(*counted)
     weighted = np.linalg.inv(unit) @ arrivals[:, : run.moving, 1:] @ unit
     kept: list[int] = []
-    grown: list[Floats] = []  # from each restart that matters to where the present segment ends
+    nothing = np.empty((0, *weighted.shape[1:]))
+    grown = nothing  # from each restart that matters to where the present segment ends
     own = own_begins(record, span)
     alone = np.linalg.norm(weighted, 2, axis=(1, 2))  # of each segment: most are all that there is to look at
-    for begin, through, size in zip((span[0], *restarts[:-1]), weighted, alone.tolist(), strict=True):
+    for begin, through, size in zip((span[0], *restarts[:-1]), weighted, alone, strict=True):
         if begin in own:  # nothing from before reaches a motion that begins anew
-            grown = []
-        grown = [through @ p for p in grown]
-        sizes = [*(float(np.linalg.norm(p, 2)) for p in grown), size]
-        grown.append(through)
-        if max(sizes) > GROWTH and len(grown) > 1:
+            grown = nothing
+        grown = through @ grown
+        sizes = np.append(np.linalg.norm(grown, 2, axis=(1, 2)) if len(grown) else (), size)
+        grown = np.concatenate([grown, through[np.newaxis]])
+        if np.max(sizes) > GROWTH and len(grown) > 1:
             kept.append(begin)
-            grown, sizes = [through], sizes[-1:]
-        # What has shrunk can grow no further than what begins here will.
-        grown = [p for p, size in zip(grown, sizes, strict=True) if size > 1.0]
+            grown, sizes = grown[-1:], sizes[-1:]
+        grown = grown[sizes > 1.0]  # what has shrunk can grow no further than what begins here will
     return tuple(kept)
 
 
