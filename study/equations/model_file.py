@@ -126,11 +126,11 @@ def format_entry(entry: ModelTerm) -> str:
     fields |= {} if varied is None else variation_entry.variation_fields(varied)
     parameters = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
     fields |= {name: repr(float(known[key])) for name, key in parameters.items() if key in known}
-    if varied is not None:
-        return _flow(fields | variation_entry.changes_field(entry))
     own = zip(entry.term.symbols, entry.symbols, strict=True)
     coefficients = {symbol: repr(float(known[key])) for symbol, key in own if key in known}
-    if coefficients and len(entry.term.symbols) == 1:
+    if varied is not None:
+        fields |= variation_entry.changes_field(entry, known)
+    elif coefficients and len(entry.term.symbols) == 1:
         fields["value"] = coefficients[entry.term.symbols[0]]
     elif coefficients:
         fields["values"] = _flow(coefficients)
@@ -217,7 +217,8 @@ def entry_from(item: Mapping[object, object]) -> ModelTerm:
     own = ("force",) if term.name not in terms.LIBRARY else ()
     if "varies_with" in item:
         plain = {key: value for key, value in item.items() if key not in own}
-        return variation_entry.entry_of(term, plain)
+        entry = variation_entry.entry_of(term, plain)
+        return entry if "held" not in item else entry.opened(_held(entry, item["held"]))
     amount = ("amplitude", "phase") if _phasor(term) else ("value",)
     yaml_text.refuse_unknown(item, ("term", *own, *amount, "values", "held", *(p.name for p in term.parameters)), name)
     parameters = [yaml_text.number_of(item, p.name, name) for p in term.parameters]

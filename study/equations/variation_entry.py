@@ -5,7 +5,7 @@
     - {term: linear_stiffness, value: 355.0}            # at the first knot
     - {term: linear_stiffness, varies_with: time}       # fitted: a smooth curve, its knots laid along the record
     - {term: linear_stiffness, varies_with: time, shape: curve, knots: [0, 20, 40], changes: [0, -3.1, -9.0]}
-    - {term: linear_stiffness, varies_with: time, shape: line, knots: [0, 60], changes: [0, -35.0]}
+    - {term: linear_stiffness, varies_with: time, shape: line, knots: [0, 60], changes: [0, -35.0], held: false}
     - {term: linear_stiffness, varies_with: time, shape: step, step_at: 31.2, lasts: 0.1, changes: -35.0}
     - {term: coulomb_friction, varies_with: band_force, only: v > 0}
 """
@@ -20,7 +20,7 @@ from study.support import yaml_text
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
-KEYS = ("term", "varies_with", "shape", "knots", "lasts", "only", "changes", STEP_AT)
+KEYS = ("term", "varies_with", "shape", "knots", "lasts", "only", "changes", "held", STEP_AT)
 
 
 def entry_of(of: Term, item: Mapping[object, object]) -> ModelTerm:
@@ -95,9 +95,9 @@ def variation_fields(variation: Variation) -> dict[str, str]:
     return found | ({} if variation.lasts is None else {"lasts": repr(float(variation.lasts))})
 
 
-def changes_field(entry: ModelTerm) -> dict[str, str]:
-    """The known changes of a term that varies, as fields of an entry in YAML."""
-    variation, known = entry.term.variation, [x for x in entry.coefficients if x is not None]
+def changes_field(entry: ModelTerm, values: Mapping[str, float]) -> dict[str, str]:
+    """The changes of a term that varies, held or where a fit begins, as fields of an entry in YAML."""
+    variation, known = entry.term.variation, [values[key] for key in entry.symbols if key in values]
     if variation is None or not known or len(known) < len(entry.coefficients):
         return {}
     of, each = variation.of.symbols, len(known) // len(variation.of.symbols)

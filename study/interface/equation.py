@@ -13,7 +13,7 @@ from study.equations.place import HERE, Kind, Place
 from study.equations.redundancy import repeated_force
 from study.interface.data import Record
 from study.interface.showing import TABLES, html_table
-from study.support.errors import expect
+from study.support.errors import StudyError, expect
 from study.support.extras import needed
 from study.support.files import replace_file
 
@@ -291,7 +291,8 @@ class Model:
         return self.equation.coordinates if self.equation.named else ()
 
     def add(
-        self, added: "Candidate | str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
+        self, added: "Candidate | str | ModelTerm | None", *, at: str | None = None,
+        between: Sequence[str] | None = None,
     ) -> "Model":  # fmt: skip
         """The model with a term more, of a structure at its place; a ``StudyError`` if it has that force already.
 
@@ -302,6 +303,8 @@ class Model:
         if isinstance(added, Candidate):
             fitted = {t.name: t for t in added.ranked.fit.model.terms}
             return self._with_terms(*self.equation.terms, *(fitted[name].opened() for name in added.ranked.names))
+        if added is None:
+            raise StudyError("None is no effect; expected one by name, or of a diagnosis that names one (found.best)")
         entry = term(added) if isinstance(added, str) else added
         if at is not None or between is not None:
             entry = replace(entry, place=_place(entry.term.name, at, between))

@@ -263,7 +263,8 @@ class Fit(FitPictures):
         return diagnosed(self, candidates or {}, without)
 
     def add(
-        self, added: "Candidate | str | ModelTerm", *, at: str | None = None, between: Sequence[str] | None = None
+        self, added: "Candidate | str | ModelTerm | None", *, at: str | None = None,
+        between: Sequence[str] | None = None,
     ) -> "Fit":  # fmt: skip
         """The fit of the model with an effect more.
 

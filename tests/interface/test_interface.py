@@ -109,6 +109,12 @@ def test_a_candidate_is_added_as_the_command_adds_it_by_name(fit, better):
     assert better.drop("cubic_stiffness").error == pytest.approx(fit.error, rel=1e-3)
 
 
+def test_nothing_is_not_added(better):
+    assert better.diagnose().best is None
+    with pytest.raises(st.StudyError, match="None is no effect; expected one by name"):
+        better.add(better.diagnose().best)
+
+
 def test_a_candidate_added_to_the_model_brings_what_was_found_as_a_start(fit, found):
     model = fit.given.add(found.best)
     assert model.terms == (*fit.given.terms, "cubic_stiffness")
