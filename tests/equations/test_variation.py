@@ -116,7 +116,7 @@ ENTRIES = (
     "{term: linear_stiffness, varies_with: time, shape: step, lasts: 0.1, step_at: 31.2, changes: -35.0}",
     "{term: linear_stiffness, varies_with: band, shape: curve, only: v > 0}",
     "{term: linear_stiffness, varies_with: pin, shape: curve, knots: [0.0, 1.0], changes: [0.0, 2.5], held: false}",
-    "{term: linear_stiffness, varies_with: time, shape: step, lasts: 0.1, step_at: 3.0, changes: -3.0, held: [step_at]}",
+    "{term: linear_stiffness, varies_with: time, shape: step, lasts: 1.0, step_at: 3.0, changes: -3.0, held: false}",
 )
 
 
