@@ -156,7 +156,8 @@ class Model:
         return replace(self, terms=tuple(t.with_values(values) for t in self.terms), modal=modal)
 
     def equation(self) -> str:
-        return " + ".join(f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms) + " = F(t)"
+        written = ((t.term.written, t.place.suffix) for t in self.terms)
+        return " + ".join(f"{' , '.join(s + at for s in own)} [{force}]" for (own, force), at in written) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:
         """Every value; all must be known, and the mass of a single coordinate positive."""

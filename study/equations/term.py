@@ -167,6 +167,15 @@ class Term:
         """Whether nothing changes its force: it moves the system to another place of rest."""
         return not any(formulas.names(c.shape) for c in self.components)
 
+    @property
+    def written(self) -> tuple[tuple[str, ...], str]:
+        """Coefficients and force as an equation has them; a change is a function of what it varies with."""
+        if self.variation is None:
+            return self.symbols, self.formula
+        of, side = self.variation.of, self.variation.side
+        changes = tuple(f"Δ{symbol}({self.variation.variable})" for symbol in of.symbols)
+        return changes, f"{of.formula} where {side}" if side else of.formula
+
     @cached_property  # cached: a diagnosis prepares hundreds of runs
     def channels(self) -> tuple[str, ...]:
         """Measured channels that its formulas name, in alphabetical order.

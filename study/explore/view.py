@@ -27,7 +27,7 @@ from study.explore import axes, check_columns, decimate, place_words, record_wor
 from study.explore.axis_scales import LEAST, Columns, Focus, heard, rms_force, within
 from study.explore.page_units import in_text, power
 from study.explore.session import Session, Stage, on_record
-from study.figures.labels import power_of_ten
+from study.figures.labels import power_of_ten, term_names
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
 from study.support.arrays import Floats
@@ -209,12 +209,14 @@ def _in_reverse(comparison: Comparison) -> dict[str, Columns]:
     shares = {"unexplained": force.unexplained, "parametric": force.parametric, "noise": force.noise}
     columns = {name: 100.0 * np.maximum(share[keep], 1e-9) for name, share in shares.items()}
     rows = [np.asarray(c[keep], dtype=np.float32) for c in force.cumulative]
+    changing = {e.name for e in comparison.fit.model.terms if e.term.variation}
+    names = [term_names(", ".join(i.terms)) if changing.issuperset(i.terms) else in_text(i.shape) for i in force.inputs]
     return {
         "force": {"f": force.frequency[keep], **columns},
         "coherence": {
             "f": [np.asarray(force.frequency[keep], dtype=np.float32)] * len(rows),
             "share": rows,
-            "name": [in_text(i.shape) for i in force.inputs],
+            "name": names,
             "dash": [DASHES[k % len(DASHES)] for k in range(len(rows))],
             "colour": [COLOURS[k % len(COLOURS)] for k in range(len(rows))],
         },

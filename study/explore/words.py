@@ -79,10 +79,11 @@ def equation(stage: Stage, values: bool = False) -> str:
     known = stage.values
     parts: list[str] = []
     for entry in stage.model.terms:
+        own, force = entry.term.written
         symbols = ", ".join(
-            f"<b>{number(known[s], 4)}</b>" if values else f"<i>{escape(s)}</i>" for s in entry.term.symbols
+            f"<b>{number(known[s], 4)}</b>" if values and s in known else f"<i>{escape(s)}</i>" for s in own
         )
-        shape = escape(in_text(entry.term.formula).replace("d2u/dt2", "d²u/dt²"))
+        shape = escape(in_text(force).replace("d2u/dt2", "d²u/dt²"))
         parts.append(f"{symbols} {shape}" if shape.isalpha() or "d²" in shape else f"{symbols} [{shape}]")
     return " + ".join(parts) + " = F(t)"
 

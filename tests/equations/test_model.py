@@ -13,6 +13,7 @@ from study.equations.model_file import read_model
 from study.equations.motion_program import motion_program
 from study.equations.simulate import simulate
 from study.equations.terms import custom, get
+from study.equations.variation import Variation, varying
 from study.support.errors import StudyError
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -59,6 +60,12 @@ def test_a_simulation_needs_inertia() -> None:
 def test_equation_shows_every_symbol(systems: dict[str, Model]) -> None:
     equation = systems["mathieu"].equation()
     assert all(symbol in equation for symbol in ("m", "c", "k", "km_cos", "km_sin", "= F(t)"))
+
+
+def test_a_change_stands_in_the_equation_as_a_function_of_what_it_varies_with() -> None:
+    curve = varying(Variation(get("linear_damping"), "warmth", knots=(0.0, 1.0, 2.0, 3.0), side="v > 0"))
+    equation = Model("rig", (free(get("inertia")), free(get("linear_damping")), free(curve))).equation()
+    assert equation == "m [d2u/dt2] + c [v] + Δc(warmth) [v where v > 0] = F(t)"
 
 
 def test_states_are_those_with_a_memory(make_model: Callable[..., Model]) -> None:
