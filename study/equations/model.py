@@ -118,6 +118,10 @@ class Model:
         own = {key: value for t in self.terms for key, value in t.values.items()}
         return own | (self.modal.values if self.modal else {})
 
+    def opened(self, held: Collection[str] = ()) -> "Model":
+        """The same model with its values as starts of a fit, but those of ``held`` keys; modes keep theirs."""
+        return self if self.modal else replace(self, terms=tuple(t.opened(held) for t in self.terms))
+
     @property
     def starts(self) -> dict[str, float]:
         """Where a fit of what is open begins, by key, as far as the model says so."""

@@ -120,11 +120,12 @@ def files(
 ) -> dict[str, bytes]:
     """Contents by file name, of a session whose model came from a file of this name and text: its comments stay.
 
-    With ``values`` the model file gives what was fitted, and a fit of it holds that; otherwise what the session holds.
+    With ``values`` the model file gives what was fitted, where the next fit begins; what the session holds stays held.
     ``drawn`` is what :func:`of_stage` gives of the present model, where that is known.
     """
     now = session.now
-    model = now.model.with_values(now.values) if values else now.model
+    held = [key for key, value in now.model.values.items() if value is not None]
+    model = now.model.with_values(now.values).opened(held) if values else now.model
     for one in session.several.separate:  # terms that tell the records of this session apart belong to it alone
         for term in [t.name for t in model.terms if set(t.symbols) & set(one.differences)]:
             model = model.without_term(term)

@@ -81,9 +81,7 @@ class Fit(FitPictures):
     @property
     def model(self) -> Model:
         """The model with its fitted values, from which a fit to another record begins; what was held is held."""
-        fitted, held = self.comparison.fit.model, self.comparison.fit.held
-        entries = fitted.terms if fitted.modal else tuple(t.opened(held) for t in fitted.terms)
-        return Model.of(replace(fitted, terms=entries))
+        return Model.of(self.comparison.fit.model.opened(self.comparison.fit.held))
 
     @property
     def given(self) -> Model:
