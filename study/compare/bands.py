@@ -28,7 +28,7 @@ def bands(views: Sequence[SensorPrediction], forces: Sequence[ForceError]) -> tu
     """The bands of each response and each force; one that has nothing unexplained is left out."""
     widest = [
         *(narrowest(str(v.sensor) if len(views) > 1 else "response", v.noise.frequency, _response(v)) for v in views),
-        *(narrowest("force", f.frequency, _force(f)) for f in forces),
+        *(narrowest(f"force at {f.coordinate}" if len(views) > 1 else "force", f.frequency, _force(f)) for f in forces),
     ]
     return tuple(band for band in widest if band is not None)
 

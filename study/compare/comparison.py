@@ -13,7 +13,7 @@ from study.compare.bands import Band, bands
 from study.compare.by_estimator import FREE_RUN, fit_by
 from study.compare.dependence import FamilyGain, families, left_by
 from study.compare.fitted_coefficients import Coefficient, Level, across_levels, coefficients, found_by, rivals_note
-from study.compare.force_error import ForceError, force_error
+from study.compare.force_error import ForceError, Judge, force_error, force_errors, mean_share
 from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
@@ -62,7 +62,7 @@ class Comparison:
     fit: FreeRunFit
     found: Estimate  # what was fitted, with its covariance
     prediction: Prediction  # measured and predicted motions on the judging part, error and noise floor
-    forces: tuple[ForceError, ...]  # the error in reverse
+    forces: tuple[ForceError, ...]  # the error in reverse, of each equation of motion that the sensors show
     bands: tuple[Band, ...]  # where in frequency most of the unexplained power of responses and force lies
     missing: Unbalanced  # what each equation of motion leaves
     missing_force: MissingForce  # the force that the model lacks where most is missing
@@ -137,14 +137,9 @@ class Comparison:
         return frequency, ratio if known else None
 
     @property
-    def force(self) -> ForceError:
-        """The error of the force on a single mass."""
-        return self.forces[0]
-
-    @property
     def force_error(self) -> float:
-        """Share of the force's power that is unexplained; of that of inertia in a structure, nan beside modes."""
-        return self.forces[0].total if self.forces else self.missing.share
+        """Share of the force's power that is unexplained, the mean of all equations; nan beside modes."""
+        return mean_share([force.total for force in self.forces])
 
     @property
     def level(self) -> float:
@@ -224,12 +219,12 @@ def _of_a_structure(fit: FreeRunFit) -> list[str]:
 
 def _judged(
     fit: FreeRunFit, keys: Sequence[str], prediction: Prediction,
-    in_reverse: Callable[[Model, Prediction], ForceError] = force_error, report: Progress = lambda _: None,
+    in_reverse: Judge = force_error, report: Progress = lambda _: None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a comparison that say how good a fit is on the judging part, and where it fails."""
     views = prediction.views
     report("force")
-    forces = () if fit.model.named else (in_reverse(fit.model, prediction),)
+    forces = force_errors(fit.model, prediction, in_reverse)
     report("where it fails")
     missing = unbalanced(fit.model, keys, prediction)
     place = next(iter(missing.shown), missing.aligned[0][0])

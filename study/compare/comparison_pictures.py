@@ -25,6 +25,7 @@ from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
 WIDE = 7.2  # inches
+EQUATIONS = 6  # in a picture, at most
 
 
 def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
@@ -46,8 +47,9 @@ def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
 
     if comparison.prepared.response == FORCE:
         return {"loops": kind_pictures.loops_figure(comparison)}
-    found = None if comparison.model.named else decays_of(comparison)  # a structure decays in several frequencies
-    return {} if found is None else {"decay": kind_pictures.decay_figure(comparison, found)}
+    every = {str(seen.sensor): decays_of(comparison, i) for i, seen in enumerate(comparison.views)}
+    found = {name: decays for name, decays in every.items() if decays is not None}
+    return {"decay": kind_pictures.decay_figure(comparison, found)} if found else {}
 
 
 def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:
@@ -76,26 +78,34 @@ def response_figure(comparison: Comparison) -> Figure:
 
 
 def force_error_figure(comparison: Comparison) -> Figure:
-    """Unexplained share of the force by frequency, and what each input explains."""
-    force = comparison.force
-    highest = force.highest
-    low, high = force.frequency[force.band][[0, -1]]
-    about = f"{percent(force.total)} of its power from {low:.3g} to {high:.3g} Hz"
+    """Unexplained share of the force by frequency, and what each input explains.
+
+    Of a structure in the equations that leave most of it, a row each.
+    """
+    forces = sorted(comparison.forces, key=lambda force: -force.total)[:EQUATIONS]
+    ends = np.array([force.frequency[force.band][[0, -1]] for force in forces])
+    about = f"{percent(comparison.force_error)} of its power from {np.min(ends):.3g} to {np.max(ends):.3g} Hz"
+    columns = min(len(forces), 2)
     figure, axes = page.empty_page(
         f"{comparison.record.name}: error of the force", f"model {comparison.model.name}; unexplained is {about}",
-        rows=2, width=WIDE, panel=2.3, legend_rows=2, share=False,
+        rows=2 * len(forces) // columns, columns=columns, width=WIDE if columns == 1 else page.width(columns),
+        panel=2.3, legend_rows=2, share=False,
     )  # fmt: skip
-    panels.force_error_panel(axes[0], force, highest)
-    keep = (force.frequency > 0.0) & (force.frequency <= highest)
-    shares = [
-        InputCoherence(i.shape, " + ".join(i.terms), force.frequency[keep], c[keep])
-        for i, c in zip(force.inputs, force.cumulative, strict=True)
-    ]
-    coherence.cumulative_panel(axes[1], shares)
-    axes[1].set_xlim(0.0, highest)
-    axes[1].set_ylabel("cumulative coherence")  # in full it is longer than the panel
-    axes[1].legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
-    page.letter(axes, ("what is left of the force", "what the inputs explain, one after the other"))
+    titles = list[str]()
+    for force, left, explained in zip(forces, axes[::2], axes[1::2], strict=True):
+        highest, of = force.highest, f" at {force.coordinate}" if len(forces) > 1 else ""
+        panels.force_error_panel(left, force, highest)
+        keep = (force.frequency > 0.0) & (force.frequency <= highest)
+        shares = [
+            InputCoherence(i.shape, " + ".join(i.terms), force.frequency[keep], c[keep])
+            for i, c in zip(force.inputs, force.cumulative, strict=True)
+        ]
+        coherence.cumulative_panel(explained, shares)
+        explained.set_xlim(0.0, highest)
+        explained.set_ylabel("cumulative coherence")  # in full it is longer than the panel
+        explained.legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
+        titles += [f"what is left of the force{of}", "what the inputs explain, one after the other"]
+    page.letter(axes, titles)
     page.shared_legend(figure, axes[:1], columns=2)
     return figure
 

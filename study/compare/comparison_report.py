@@ -14,6 +14,7 @@ from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.decay import decays_of
 from study.compare.dependence import explained_by_place
 from study.compare.fitted_coefficients import Coefficient, Level, value_and_interval
+from study.compare.force_error import ForceError, mean_share
 from study.compare.force_map import curve, surface
 from study.compare.varying_coefficients import varying_fields
 from study.equations import model_file
@@ -86,36 +87,65 @@ def _of_record(comparison: Comparison) -> Row:
         "notes": list(comparison.notes),
         "says": comparison_in_words(comparison),
     }  # fmt: skip
-    for of, row in (_by_sensor(comparison) if model.named else _of_one_mass(comparison)).items():
+    for of, row in (_of_all(comparison) | ({"modes": mode_rows(comparison.modes)} if model.named else {})).items():
         document[of] = document[of] | row if of in document and isinstance(row, dict) else row
     return document
 
 
-def _of_one_mass(comparison: Comparison) -> Row:
-    """What a document holds of a single mass alone, by the field that it joins."""
-    seen, found = comparison.prediction.of(0), decays_of(comparison)
-    return {
+def _of_all(comparison: Comparison) -> Row:
+    """What else a document holds of errors and noise, by the field that it joins; of a structure by place too."""
+    views, forces, floors = comparison.views, comparison.forces, comparison.prediction.floors
+    errors = np.array([v.noise.error / v.size for v in views])
+    floor, (size, left, unit) = comparison.prediction.floor, _sizes(comparison)
+    weights = floors / floor if floor > 0.0 else np.ones(len(views))
+    found: Row = {
         "noise_floor": {
-            "force": comparison.force.noise_total, "response_error": seen.noise.error / seen.size,
-            "from": seen.noise.source,
+            **({"force": mean_share([f.noise_total for f in forces])} if forces else {}),
+            "response_error": math.hypot(*(weights * errors)) / len(views),
+            "from": "; ".join(dict.fromkeys(v.noise.source for v in views)),
         },
-        "rms": _in_its_unit(comparison, 0),
-        "error_of_fitted_coefficients": {"force": comparison.force.parametric_total},
-        "above_noise": {"standard_errors": seen.noise.significance},
-        **({"decay": found.plain()} if found else {}),
+        "rms": {"response_error": left, "response": size, "unit": unit},
+        **({"error_of_fitted_coefficients": {"force": mean_share([f.parametric_total for f in forces])}}
+           if forces else {}),
+        "above_noise": {"standard_errors": max(v.noise.significance for v in views)},
+        **_decays(comparison),
     }  # fmt: skip
+    if not comparison.model.named:
+        return found
+    by_place: Row = {
+        "error": {"sensors": {str(v.sensor): v.error for v in views}}
+        | _by_coordinate({f.coordinate: f.total for f in forces}),
+        "noise_floor": {"sensors": {str(v.sensor): v.noise.rms / v.size for v in views}}
+        | _by_coordinate({f.coordinate: f.noise_total for f in forces}),
+        "rms": {"sensors": {str(v.sensor): _in_its_unit(comparison, i) for i, v in enumerate(views)}},
+        "error_of_fitted_coefficients": _by_coordinate({f.coordinate: f.parametric_total for f in forces}),
+        "above_noise": {"sensors": {str(v.sensor): {"standard_errors": v.noise.significance} for v in views}},
+    }  # fmt: skip
+    joined = {of: found.get(of, {}) | row for of, row in by_place.items()}
+    return found | {of: row for of, row in joined.items() if row}
 
 
-def _by_sensor(comparison: Comparison) -> Row:
-    """The same of a structure: every sensor's share, its modes."""
-    views = comparison.views
-    by_sensor: dict[str, Row] = {
-        "error": {str(v.sensor): v.error for v in views},
-        "noise_floor": {str(v.sensor): v.noise.rms / v.size for v in views},
-        "rms": {str(v.sensor): _in_its_unit(comparison, i) for i, v in enumerate(views)},
-        "above_noise": {str(v.sensor): {"standard_errors": v.noise.significance} for v in views},
-    }  # fmt: skip
-    return {of: {"sensors": row} for of, row in by_sensor.items()} | {"modes": mode_rows(comparison.modes)}
+def _by_coordinate(shares: dict[str, float]) -> Row:
+    return {"coordinates": shares} if shares else {}
+
+
+def _decays(comparison: Comparison) -> Row:
+    """Frequency and damping against amplitude of a free decay; of several sensors each by its name."""
+    every = {str(v.sensor): decays_of(comparison, i) for i, v in enumerate(comparison.views)}
+    found = {name: decays.plain() for name, decays in every.items() if decays is not None}
+    if not found:
+        return {}
+    return {"decay": found if len(every) > 1 else next(iter(found.values()))}
+
+
+def _sizes(comparison: Comparison) -> tuple[float, float, str]:
+    """Rms of what the sensors measure, and of what they miss, in their unit; of several units, over their own rms."""
+    views, units = comparison.views, {comparison.record.units.get(str(v.sensor), "") for v in comparison.views}
+    if len(units) > 1:
+        return 1.0, comparison.prediction.error, ""
+    sizes = ([v.size for v in views], [v.error * v.size for v in views])
+    whole, left = (math.hypot(*values) / math.sqrt(len(views)) for values in sizes)
+    return whole, left, units.pop()
 
 
 def _in_its_unit(comparison: Comparison, sensor: int) -> Row:
@@ -215,7 +245,7 @@ def history_step(comparison: Comparison, added: str | None = None, dropped: str 
     ``added`` names the term that is new in it, ``dropped`` the one that was taken out.
     """
     force, prediction = comparison.force_error, comparison.prediction
-    rms, unit = in_units(comparison)
+    _, rms, unit = _sizes(comparison)
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.record.name,
@@ -224,15 +254,6 @@ def history_step(comparison: Comparison, added: str | None = None, dropped: str 
         "noise_floor": {"response": prediction.floor},
         "converged": comparison.fit.converged, "coefficients": [coefficient_row(c) for c in comparison.coefficients],
     }  # fmt: skip
-
-
-def in_units(comparison: Comparison) -> tuple[float, str]:
-    """Rms of what the sensors miss in their unit; where they have several, in their own rms."""
-    views, units = comparison.views, {comparison.record.units.get(str(v.sensor), "") for v in comparison.views}
-    if len(units) > 1:
-        return comparison.prediction.error, ""
-    left = [v.error * v.size for v in views]
-    return math.hypot(*left) / math.sqrt(len(left)), units.pop()
 
 
 def as_json(content: Row) -> bytes:
@@ -280,10 +301,11 @@ def _csv(table: Columns) -> bytes:
 
 def _summary(comparison: Comparison) -> Columns:
     prediction = comparison.prediction
+    forces = comparison.forces
     of_force = {
-        "force_error_of_fitted_coefficients": comparison.force.parametric_total,
-        "force_noise_floor": comparison.force.noise_total,
-    } if comparison.forces else {}  # fmt: skip
+        "force_error_of_fitted_coefficients": mean_share([f.parametric_total for f in forces]),
+        "force_noise_floor": mean_share([f.noise_total for f in forces]),
+    } if forces else {}  # fmt: skip
     row = {
         "model": comparison.model.name, "response_error": prediction.error, "response_noise_floor": prediction.floor,
         "response_above_noise": prediction.above_noise, "force_error": comparison.force_error, **of_force,
@@ -302,7 +324,10 @@ def _coefficients(comparison: Comparison) -> Columns:
 
 
 def _force_error(comparison: Comparison) -> Columns:
-    force = comparison.force
+    return _of_each("coordinate", {force.coordinate: _by_frequency(force) for force in comparison.forces})
+
+
+def _by_frequency(force: ForceError) -> Columns:
     columns: dict[str, Any] = {
         "frequency": force.frequency, "force_density": force.force, "unexplained": force.unexplained,
         "left_by_fitted": force.parametric, "noise": force.noise, "motion_above_noise": force.band,
@@ -358,8 +383,7 @@ def _by_level(level: Level, names: Sequence[str]) -> Columns:
 
 def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
     """The table that a person reads in ten seconds, and the sentences below it."""
-    named = comparisons[0].model.named
-    heads, rows = _sensor_rows(comparisons) if named else _record_rows(comparisons)
+    named, (heads, rows) = comparisons[0].model.named, _error_rows(comparisons)
     errors = tabulate(rows, heads, tablefmt="simple", disable_numparse=True, stralign="right", colglobalalign="right")
     bodies = [_levels(moving, comparisons)] if moving else [_values(comparisons[0])]
     if named and len(comparisons) == 1 and not comparisons[0].model.prescribed:
@@ -369,33 +393,25 @@ def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level
     return text + footnotes(notes)
 
 
-def _record_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
-    heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]
-    return heads, [
-        [c.record.name, percent(c.prediction.error), _in_units(c, 0), percent(c.prediction.floor),
-         percent(c.force.total), percent(c.force.noise_total)] for c in comparisons
-    ]  # fmt: skip
-
-
-def _sensor_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
-    heads, rows = ["sensor", "response error", "in units", "noise floor"], list[list[str]]()
-    heads += ["force left there"] * bool(comparisons[0].missing.equations)
+def _error_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
+    """Heads, and a row for each record; of a structure for each sensor in it."""
+    first, several = comparisons[0], len(comparisons) > 1
+    named, reversed_too, left_too = first.model.named, bool(first.forces), bool(first.missing.equations)
+    heads = [""] * (several or not named) + ["sensor"] * named + ["response error", "in units", "noise floor"]
+    heads += ["force error", "noise alone"] * reversed_too + ["force left there"] * (named and left_too)
+    rows = list[list[str]]()
     for c in comparisons:
-        rms = dict(zip(c.missing.equations, c.missing.rms, strict=True))
-        left = {name: f"{x:.3g} {c.missing.units(name)['force']}" for name, x in rms.items()}
-        before = [c.record.name] * (len(comparisons) > 1)
-        rows += [
-            [
-                *before,
-                str(v.sensor),
-                percent(v.error),
-                _in_units(c, i),
-                percent(floor),
-                *(left[name] for name in c.missing.equations if name == v.sensor.coordinate),
-            ]
-            for i, (v, floor) in enumerate(zip(c.views, c.prediction.floors, strict=True))
-        ]
-    return [""] * (len(comparisons) > 1) + heads, rows
+        forces, rms = {f.coordinate: f for f in c.forces}, dict(zip(c.missing.equations, c.missing.rms, strict=True))
+        for i, (v, floor) in enumerate(zip(c.views, c.prediction.floors, strict=True)):
+            where, force = v.sensor.coordinate, forces.get(v.sensor.coordinate)
+            in_reverse = [percent(force.total), percent(force.noise_total)] if force is not None else ["-", "-"]
+            left = f"{rms[where]:.3g} {c.missing.units(where)['force']}" if where in rms and named else "-"
+            rows.append([
+                *[c.record.name] * (several or not named), *[str(v.sensor)] * named,
+                percent(v.error), _in_units(c, i), percent(floor), *in_reverse * reversed_too,
+                *[left] * (named and left_too),
+            ])  # fmt: skip
+    return heads, rows
 
 
 def footnotes(notes: Sequence[str]) -> str:
@@ -412,10 +428,12 @@ def _headline(comparison: Comparison) -> str:
     by = "" if comparison.estimator == FREE_RUN else f" by {comparison.estimator}"
     fit, judge = comparison.spans
     response = "of each sensor" if comparison.model.named else comparison.plan.response
-    force = "; force: rms that the equation of motion leaves" if comparison.missing.equations else ""
+    force = ""
     if comparison.forces:
-        low, high = comparison.force.frequency[comparison.force.band][[0, -1]]
-        force = f"; force: share of power unexplained, {low:.3g} to {high:.3g} Hz"
+        ends = np.array([f.frequency[f.band][[0, -1]] for f in comparison.forces])
+        force = f"; force: share of power unexplained, {np.min(ends):.3g} to {np.max(ends):.3g} Hz"
+    if comparison.model.named and comparison.missing.equations:
+        force += f"{',' if force else '; force:'} rms that the equation of motion leaves"
     return (
         f"model {comparison.model.name}: fitted to samples {fit[0]} to {fit[1]}{by}, judged on {judge[0]} to "
         f"{judge[1]}\nresponse: free run, rms difference over rms {response}{force}"

@@ -100,7 +100,7 @@ def _of_equations(comparison: Comparison) -> list[str]:
         lacking, shown = ", ".join(missing.lacking), comparison.prepared.response != FORCE
         why = "which no sensor shows" if shown else "where none was measured"
         said.append(f"the reverse system says no force of {lacking}, {why}")
-    if np.any(missing.rms > 0.0):
+    if len(missing.equations) > 1 and np.any(missing.rms > 0.0):
         i = int(np.argmax(missing.rms))
         name = missing.equations[i]
         left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms of its forces remain"

@@ -10,6 +10,7 @@ and phase (complex demodulation: P. Bloomfield, Fourier Analysis of Time Series,
 alone by least squares, is evaluated where they begin; it needs nothing from outside of the window.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from study.compare.comparison import Comparison
 from study.equations.free_run import prepare
 from study.identify.frequency_domain.starting_values import frequency_and_rate
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.outputs import alone
+from study.records.outputs import Outputs
 from study.records.prepared import Prepared
 from study.records.record import Record, Stretch
 from study.records.states import starting_states
@@ -56,32 +57,30 @@ class Decays:
         return {k: d and {n: np.asarray(x).tolist() for n, x in vars(d).items()} for k, d in parts.items()}
 
 
-def decays_of(comparison: Comparison) -> Decays | None:
-    """Those of a comparison; None where it is no free decay, or too short a one."""
-    prepared = comparison.prediction.prepared
-    return decays(comparison.fit, prepared, comparison.prediction.of(0).noise.rms) if prepared.free else None
+def decays_of(comparison: Comparison, number: int = 0) -> Decays | None:
+    """Those of a comparison as one of its sensors shows them; None where it is no free decay, or too short a one."""
+    prepared, seen = comparison.prediction.prepared, comparison.prediction.of(number)
+    return decays(comparison.fit, prepared, seen.noise.rms, number) if prepared.free else None
 
 
-def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:
+def decays(fit: FreeRunFit, prepared: Prepared, floor: float, number: int = 0) -> Decays | None:
     """Both along each free stretch of a record, from its loudest sample on; None where all are too short.
 
-    ``floor`` is the rms of the noise on the response.
+    ``floor`` is the rms of the noise on what the sensor of this number shows. Of a structure they are those of the
+    frequency in which that swings most.
     """
-    response = prepared.response
+    response = str(prepared.outputs.sensors[number])
     omega, _ = frequency_and_rate(prepared.record.part(*prepared.plan.fit), response)
     wholes = _whole_stretches(prepared.record)
     least = QUIET * floor
     measured = [_decay(s.source[response][s.first : s.last], prepared.dt, omega, least) for s in wholes]
-    predicted: list[Decay] | None = []
-    for stretch in wholes:
-        try:
-            motion = _free_motion(fit, stretch, response)
-        except DivergenceError:
-            predicted = None
-            break
-        predicted.append(_decay(motion, prepared.dt, omega, least))
+    predicted: Decay | None = None
+    if not fit.model.modal:  # no sensor shows the state of a mode
+        with suppress(DivergenceError):
+            motions = [_free_motion(fit, prepared.outputs, stretch)[:, number] for stretch in wholes]
+            predicted = _joined([_decay(motion, prepared.dt, omega, least) for motion in motions])
     joined = _joined(measured)
-    return None if not len(joined.amplitude) else Decays(joined, None if predicted is None else _joined(predicted))
+    return Decays(joined, predicted) if len(joined.amplitude) else None
 
 
 def _whole_stretches(record: Record) -> list[Stretch]:
@@ -98,16 +97,14 @@ def _whole_stretches(record: Record) -> list[Stretch]:
     return wholes
 
 
-def _free_motion(fit: FreeRunFit, stretch: Stretch, response: str) -> Floats:
-    """The fitted model let go where a stretch begins."""
-    outputs = alone(response)
+def _free_motion(fit: FreeRunFit, outputs: Outputs, stretch: Stretch) -> Floats:
+    """The fitted model let go where a stretch begins, shape (n, sensors)."""
     run = prepare(
         fit.model, stretch.source, sensors=outputs.sensors, steps_per_sample=max(fit.steps_per_sample, 2),
         span=(stretch.first, stretch.last),
     )  # fmt: skip
-    state = np.zeros(run.states)
-    state[:2] = starting_states(stretch.source, outputs, (stretch.first,))[0]
-    return run.respond({}, state)[0][:, 0]
+    begun = starting_states(stretch.source, outputs, (stretch.first,), coordinates=fit.model.coordinates)[0]
+    return run.respond({}, np.pad(begun, (0, run.states - len(begun))))[0]
 
 
 def _decay(values: Floats, dt: float, omega: float, least: float) -> Decay:

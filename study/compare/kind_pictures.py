@@ -3,6 +3,8 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -17,27 +19,30 @@ from study.records.record import FORCE, MOTIONS, Sensor
 WIDE = 7.2  # inches
 
 
-def decay_figure(comparison: Comparison, found: Decays) -> Figure:
-    """Frequency and damping ratio against amplitude, measured and of the fitted model."""
-    unit = comparison.record.units.get(comparison.plan.response, "")
+def decay_figure(comparison: Comparison, decays: Mapping[str, Decays]) -> Figure:
+    """Frequency and damping ratio against amplitude, measured and of the fitted model; a column for each sensor."""
+    count = len(decays)
     figure, axes = page.empty_page(
         f"{comparison.record.name}: free decay", f"model {comparison.model.name}; windows of the analytic signal",
-        rows=2, width=WIDE, panel=2.2,
+        rows=2, columns=count, width=WIDE if count == 1 else page.width(count), panel=2.2, share=count == 1,
     )  # fmt: skip
-    for axis, what, name in zip(axes, ("frequency", "damping"), ("frequency (Hz)", "damping ratio"), strict=True):
-        seen = found.measured
-        axis.errorbar(
-            seen.amplitude, getattr(seen, what), 2.0 * getattr(seen, f"{what}_error"), fmt="o", markersize=3.0,
-            color="0.45", elinewidth=0.8, label="measured",
-        )  # fmt: skip
-        if found.predicted is not None:
-            order = np.argsort(found.predicted.amplitude)
-            axis.plot(found.predicted.amplitude[order], getattr(found.predicted, what)[order], **panels.PREDICTED)
-        axis.set_xscale("log")
-        axis.set_ylabel(name)
-    axes[1].set_xlabel(f"amplitude of the {comparison.plan.response} ({dimensions.pretty(unit)})")
-    page.letter(axes, ("frequency", "damping ratio"))
-    page.shared_legend(figure, axes)
+    for column, (sensor, found) in enumerate(decays.items()):
+        both = axes[column], axes[count + column]
+        for axis, what, name in zip(both, ("frequency", "damping"), ("frequency (Hz)", "damping ratio"), strict=True):
+            seen = found.measured
+            axis.errorbar(
+                seen.amplitude, getattr(seen, what), 2.0 * getattr(seen, f"{what}_error"), fmt="o", markersize=3.0,
+                color="0.45", elinewidth=0.8, label="measured",
+            )  # fmt: skip
+            if found.predicted is not None:
+                order = np.argsort(found.predicted.amplitude)
+                axis.plot(found.predicted.amplitude[order], getattr(found.predicted, what)[order], **panels.PREDICTED)
+            axis.set_xscale("log")
+            axis.set_ylabel(name)
+        unit = dimensions.pretty(comparison.record.units.get(sensor, ""))
+        both[1].set_xlabel(f"amplitude of the {sensor} ({unit})")
+    page.letter(axes, [what for what in ("frequency", "damping ratio") for _ in decays])
+    page.shared_legend(figure, axes[:1])
     return figure
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from study.compare.force_error import ForceError, from_noise, lines_to_judge
-from study.compare.prediction import Prediction
+from study.compare.force_error import ForceError, from_noise, judged_equation, lines_to_judge
+from study.compare.prediction import SensorPrediction
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs, with_known_changes
+from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.local_polynomial import (
     SPARE,
     Lines,
@@ -31,8 +31,8 @@ Complexes = NDArray[np.complex128]
 DEGREE = 2
 
 
-def local_force_error(model: Model, prediction: Prediction) -> ForceError:
-    """Judge a fitted model in reverse on the judging part, as ``study.compare.force_error.force_error`` does.
+def local_force_error(model: Model, view: SensorPrediction) -> ForceError | None:
+    """Judge the equation of a sensor's coordinate, as ``study.compare.force_error.force_error`` does.
 
     The first entry of every array stands for the lines below the first band, of which nothing is said.
 
@@ -41,10 +41,13 @@ def local_force_error(model: Model, prediction: Prediction) -> ForceError:
     StudyError
         If the judging part is too short for two bands.
     """
-    prepared, noise = prediction.prepared, prediction.of(0).noise
+    prepared, noise = view.prepared, view.noise
     record = prepared.record.part(*prepared.inner(prepared.plan.judge))
-    inputs = with_known_changes(reverse_inputs(model), model)
-    lines = transform([*histories(inputs, record), record["force"]], record.dt)
+    equation = judged_equation(model, view, record, (0, len(record)))
+    if equation is None:
+        return None
+    inputs, (*driven, response, acting) = equation.inputs, equation.channels
+    lines = transform([*driven, acting], record.dt)
     local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE) // 2)
     index = _bands(lines, local, record.name)
     frequency = np.concatenate([[0.0], lines.frequency[index[:, local.half_width]]])
@@ -52,14 +55,15 @@ def local_force_error(model: Model, prediction: Prediction) -> ForceError:
     left = [noise_variance(replace(lines, inputs=lines.inputs[: r + 1]), index, local) for r in range(len(inputs))]
     shares = np.array([np.minimum(_over(_with_zero(part * lines.density), force), 1.0) for part in left])
     rest = _rest(model, inputs, lines, index, local)
-    motion = np.asarray(rfft(record[prepared.response]), dtype=np.complex128)[1 : len(lines.frequency) + 1]
+    motion = np.asarray(rfft(response), dtype=np.complex128)[1 : len(lines.frequency) + 1]
     density = np.interp(frequency, noise.frequency, noise.density)
     return ForceError(
+        coordinate=view.sensor.coordinate,
         frequency=frequency,
         force=force,
         unexplained=shares[-1],
         parametric=_over(_with_zero(rest * lines.density), force),
-        noise=_over(from_noise(frequency, inputs, model, prepared.response, density), force),
+        noise=_over(from_noise(frequency, inputs, model, view), force),
         cumulative=np.maximum.accumulate(1.0 - shares, axis=0),
         inputs=inputs,
         band=lines_to_judge(

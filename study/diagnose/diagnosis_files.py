@@ -64,6 +64,8 @@ def diagnosis_files(
         for of, found in (("error", prediction.errors), ("noise_floor", prediction.floors)):
             shown = zip(prediction.prepared.outputs.sensors, found.tolist(), strict=True)
             content[of]["sensors"] = {str(sensor): value for sensor, value in shown}
+        if comparison.forces:
+            content["error"] |= {"coordinates": {force.coordinate: force.total for force in comparison.forces}}
         after = diagnosis.modes_after
         content["modes"] = {"before": mode_rows(comparison.modes), "after": after and mode_rows(after)}
     if diagnosis.varying:

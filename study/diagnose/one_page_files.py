@@ -64,7 +64,7 @@ def draw(axes: Sequence[Axes], content: OnePage) -> None:
     for label, seen, colour, dash in left:
         axes[1].plot(*_spectrum(seen.residual, content), color=colour, linestyle=dash, label=label)
     axes[1].set_yscale("log")
-    axes[1].set_xlim(0.0, before.force.highest if before.forces else 0.5 / before.prediction.dt)
+    axes[1].set_xlim(0.0, min([force.highest for force in before.forces], default=0.5 / before.prediction.dt))
     axes[1].set_title("what is left, by frequency")
     axes[1].set_xlabel("frequency (Hz)")
     axes[1].set_ylabel(f"{dimensions.pretty(unit)} per root Hz")

@@ -3,6 +3,7 @@
 A row of the property ``html`` names an element of the document instead.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -41,10 +42,11 @@ def force_limits(comparison: Comparison) -> tuple[float, float]:
     """Ends of the axis of the force in per cent: where the motion is lost in noise, shares leave the panel."""
     if not comparison.forces:
         return 1.0, 100.0
-    force = comparison.force
-    keep = heard(comparison, force.frequency)
-    least = min(float(np.min(share[keep])) for share in (force.parametric, force.unexplained, force.noise))
-    most = max(float(np.max(share[force.band])) for share in (force.parametric, force.unexplained))
+    least, most = math.inf, 0.0
+    for force in comparison.forces:
+        keep = heard(comparison, force.frequency)
+        least = min(least, *(float(np.min(s[keep])) for s in (force.parametric, force.unexplained, force.noise)))
+        most = max(most, *(float(np.max(s[force.band])) for s in (force.parametric, force.unexplained)))
     return 50.0 * max(least, 1e-9), max(200.0, 150.0 * most)
 
 

@@ -98,7 +98,8 @@ def rms_force(comparison: Comparison) -> float:
 
 def highest(comparison: Comparison) -> float:
     """Frequency in hertz at which the axes of frequency end."""
-    return comparison.forces[0].highest if comparison.forces else highest_frequency(comparison)
+    alone = len(comparison.model.coordinates) == 1 and comparison.forces
+    return comparison.forces[0].highest if alone else highest_frequency(comparison)
 
 
 def heard(comparison: Comparison, frequency: Floats) -> NDArray[np.bool_]:

@@ -70,7 +70,7 @@ def cards_of(comparison: Comparison) -> tuple[tuple[Card, ...], tuple[Card, ...]
     checks = CHECKS[kind_of(comparison)]
     if not comparison.model.named:
         return (), (FORCE, MISSING, *checks)
-    return (MISSING, BY_FREQUENCY), (BY_SENSOR, *(card for card in checks if card != DECAY))  # no one frequency decays
+    return (MISSING, BY_FREQUENCY), (BY_SENSOR, *((FORCE[:2],) if comparison.forces else ()), *checks)
 
 
 def history_height(steps: int) -> int:

@@ -32,11 +32,8 @@ def columns(focus: Focus) -> dict[str, Columns]:
 
 
 def _decay(focus: Focus) -> dict[str, Columns]:
-    """Frequency and damping ratio in per cent against amplitude; nothing where the decay is too short for them.
-
-    Nor of a structure, which decays in several frequencies.
-    """
-    found = None if focus.comparison.model.named else decays_of(focus.comparison)
+    """Frequency and damping ratio in per cent against amplitude; nothing where the decay is too short for them."""
+    found = decays_of(focus.comparison, focus.number)
     shown: dict[str, Columns] = {}
     for name, one in (("decay", found and found.measured), ("decay_model", found and found.predicted)):
         rows = np.zeros((5, 0)) if not one else np.array(

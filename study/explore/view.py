@@ -97,7 +97,6 @@ class View:
             "sensors": _sensors(comparison),
             "blocks": _blocks(comparison),
             "constancy": _constancy(self.stage.shown),
-            **_in_reverse(comparison),
         }
         said = words.words(self.stage, self.step, self.live)
         said |= record_words.several_records(self.found, comparison.record.name, self.live)
@@ -121,6 +120,7 @@ class View:
             "lines": {"f": f[keep], "p": _by_block(density[:, keep] / factor**2)},
             "would_time": would_differ(focus, rows),
             "would_spectrum": {str(i): _density(focus, residual) / factor for i, residual in enumerate(views)},
+            **_in_reverse(focus),
             **check_columns.columns(focus),
         }
         return single_precision({**columns, "frame_sensor": _settings(axes.sensor_axes(focus, columns), {})})
@@ -200,11 +200,35 @@ def _blocks(comparison: Comparison) -> Columns:
             "all": np.ones(len(left))}  # fmt: skip
 
 
-def _in_reverse(comparison: Comparison) -> dict[str, Columns]:
-    """What is left of the force in reverse, and what the inputs explain of it one after the other; of a single mass."""
+def _constancy(rows: Sequence[Ranked]) -> Columns:
+    """A_j(f) of every candidate whose coefficient was followed, one below the other; ``row`` tells whose it is."""
+    columns: dict[str, list[Floats]] = {name: [np.zeros(0)] for name in ("row", "f", "value", "low", "high")}
+    for i, row in enumerate(rows):
+        if (line := row.effect.flatness) is None:
+            continue
+        unit = power_of_ten(abs(row.effect.coefficient))[0]  # of its axis
+        bounds = {"low": -NINETY_FIVE, "value": 0.0, "high": NINETY_FIVE}
+        values = {name: (line.value.real + errors * line.error) / unit for name, errors in bounds.items()}
+        for name, column in {"row": np.full(len(line.at), float(i)), "f": line.at, **values}.items():
+            columns[name].append(column)
+    return {name: np.concatenate(parts) for name, parts in columns.items()}
+
+
+# ---- of a sensor
+
+
+def _in_reverse(focus: Focus) -> dict[str, Columns]:
+    """What the equation of the sensor's coordinate leaves of the force, and what its inputs explain, one after another.
+
+    Empty where that equation has a motion that no sensor shows; nothing beside modes.
+    """
+    comparison = focus.comparison
     if not comparison.forces:
         return {}
-    force = comparison.force
+    force = next((f for f in comparison.forces if f.coordinate == focus.sensor.sensor.coordinate), None)
+    if force is None:
+        of_force, of_inputs = ("f", "unexplained", "parametric", "noise"), ("f", "share", "name", "dash", "colour")
+        return {"force": {name: [] for name in of_force}, "coherence": {name: [] for name in of_inputs}}
     keep = heard(comparison, force.frequency)
     shares = {"unexplained": force.unexplained, "parametric": force.parametric, "noise": force.noise}
     columns = {name: 100.0 * np.maximum(share[keep], 1e-9) for name, share in shares.items()}
@@ -221,23 +245,6 @@ def _in_reverse(comparison: Comparison) -> dict[str, Columns]:
             "colour": [COLOURS[k % len(COLOURS)] for k in range(len(rows))],
         },
     }
-
-
-def _constancy(rows: Sequence[Ranked]) -> Columns:
-    """A_j(f) of every candidate whose coefficient was followed, one below the other; ``row`` tells whose it is."""
-    columns: dict[str, list[Floats]] = {name: [np.zeros(0)] for name in ("row", "f", "value", "low", "high")}
-    for i, row in enumerate(rows):
-        if (line := row.effect.flatness) is None:
-            continue
-        unit = power_of_ten(abs(row.effect.coefficient))[0]  # of its axis
-        bounds = {"low": -NINETY_FIVE, "value": 0.0, "high": NINETY_FIVE}
-        values = {name: (line.value.real + errors * line.error) / unit for name, errors in bounds.items()}
-        for name, column in {"row": np.full(len(line.at), float(i)), "f": line.at, **values}.items():
-            columns[name].append(column)
-    return {name: np.concatenate(parts) for name, parts in columns.items()}
-
-
-# ---- of a sensor
 
 
 def over_time(focus: Focus, span: tuple[float, float] | None = None) -> Columns:

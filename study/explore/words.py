@@ -96,14 +96,16 @@ def _figures(comparison: Comparison) -> str:
         size = worst.error * worst.size
         shown = motion(comparison.record.unit(worst.sensor), size)
         about = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {in_percent(1.0 - worst.error)}"
-    of_inertia = not (comparison.forces or comparison.model.prescribed)
-    unexplained = "of the power of those of inertia" if of_inertia else "of its power unexplained"
+    unexplained = "of its power unexplained"
+    if len(comparison.forces) > 1:
+        most = max(comparison.forces, key=lambda force: force.total)
+        unexplained += f"; worst {in_percent(most.total)} at {most.coordinate}"
     cells = (
         ("error", "Error of the response", in_percent(prediction.error), about, PREDICTED),
         ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", FLOOR),
         ("force", "Error of the force", in_percent(comparison.force_error), unexplained, FORCE),
     )
-    told = cells if comparison.forces or comparison.missing.equations else cells[:-1]  # modes have no equation
+    told = cells if comparison.forces else cells[:-1]  # modes have no equation
     return "".join(_figure(*cell) for cell in told)
 
 

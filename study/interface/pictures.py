@@ -48,23 +48,28 @@ class FitPictures:
             axes.legend(**ABOVE)
         return axes
 
-    def plot_frf(self, ax: "Axes | None" = None, *, part: str = "magnitude") -> "Axes":
+    def plot_frf(
+        self, ax: "Axes | None" = None, *, part: str = "magnitude", sensor: str | None = None
+    ) -> "Axes":  # fmt: skip
         """Response over force by frequency, of the record and of the model's free run under the same force.
 
         Where the motion is prescribed, force over displacement: the dynamic stiffness.
-        ``part`` is ``magnitude``, ``phase`` or ``coherence``.
+        ``part`` is ``magnitude``, ``phase`` or ``coherence``; ``sensor`` as for :meth:`plot`.
         """
         from study.compare import fit_panels
+        from study.compare.connection_spectra import highest_frequency
         from study.compare.response_functions import drive_of, response_functions
         from study.support.errors import expect
 
         expect(part in ("magnitude", "phase", "coherence"), f"part is {part!r}; expected magnitude, phase or coherence")
-        _of_one_mass(self.comparison, "plot_frf")
-        functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
+        seen = self._seen(sensor)
+        functions = response_functions(self.comparison.prediction, seen.number)
+        alone = len(self.comparison.views) == 1 and self.comparison.forces
+        highest = self.comparison.forces[0].highest if alone else highest_frequency(self.comparison)
         with drawing_axes(ax) as (axes,):
             if part == "magnitude":
-                drive = drive_of(self._seen(None))
-                unit = f"{self._unit(self._seen(None))}/{self.comparison.record.units.get(drive, '')}"
+                drive = drive_of(seen)
+                unit = f"{self._unit(seen)}/{self.comparison.record.units.get(drive, '')}"
                 return fit_panels.response_magnitude(axes, functions, unit, highest)
             return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
                 axes, functions, highest
@@ -112,13 +117,22 @@ class FitPictures:
 
             return force_curve(axes, curve(motion[lacking.inner], lacking.force[lacking.inner]), against, units)
 
-    def plot_force_error(self, ax: "Axes | None" = None) -> "Axes":
-        """Unexplained share of the force by frequency."""
-        _of_one_mass(self.comparison, "plot_force_error")
+    def plot_force_error(self, ax: "Axes | None" = None, *, coordinate: str | None = None) -> "Axes":
+        """Unexplained share of the force by frequency.
+
+        Of a structure in the equation of motion of a ``coordinate``, or in the one that leaves most.
+        """
+        from study.support.errors import expect
+
+        forces = {force.coordinate: force for force in self.comparison.forces}
+        known = ", ".join(forces) or "none: the sensors show no equation of motion"
+        there = bool(forces) if coordinate is None else coordinate in forces
+        expect(there, f"coordinate is {coordinate!r}; expected one of {known}")
+        force = max(forces.values(), key=lambda f: f.total) if coordinate is None else forces[coordinate]
         with drawing_axes(ax) as (axes,):
             from study.compare.panels import force_error_panel
 
-            drawn = force_error_panel(axes, self.comparison.force, self.comparison.force.highest)
+            drawn = force_error_panel(axes, force, force.highest)
             drawn.legend(loc="upper right")
         return drawn
 
@@ -148,11 +162,3 @@ class FitPictures:
 
     def _unit(self, seen: "SensorPrediction") -> str:
         return dimensions.pretty(self.comparison.record.units.get(str(seen.sensor), ""))
-
-
-def _of_one_mass(comparison: "Comparison", what: str) -> None:
-    from study.support.errors import expect
-
-    expect(
-        not comparison.model.named, f"{what} is of a single mass; expected one of plot, plot_residual for a structure"
-    )

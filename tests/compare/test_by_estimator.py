@@ -64,12 +64,12 @@ def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -
 
 def test_the_error_of_the_force_is_without_leakage() -> None:
     made = record(noise=0.0)
-    own, report = (compared(OPEN, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    own, report = (compared(OPEN, made, estimator=name).forces[0] for name in ("local_polynomial", "miso"))
     assert own.total < 1e-6 < 1e-3 < report.total, "nothing is missing"
     assert own.parametric_total < 1e-5
     assert own.frequency[1] - own.frequency[0] == pytest.approx(own.frequency[2] - own.frequency[1])
     linear = Model("believed", OPEN.terms[:3])
-    one, other = (compared(linear, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    one, other = (compared(linear, made, estimator=name).forces[0] for name in ("local_polynomial", "miso"))
     assert one.total == pytest.approx(other.total, rel=0.15), "what is missing is seen by both"
     assert one.parametric_total == pytest.approx(other.parametric_total, rel=0.15)
     assert np.all(np.diff(own.cumulative, axis=0) >= 0.0)
@@ -79,14 +79,14 @@ def test_a_judging_part_too_short_for_two_bands(local: Comparison) -> None:
     prepared = prepare_record(record(), Plan("displacement", (0, 4096), (4096, 4160)))
     prediction = predict(local.fit, prepared)
     with pytest.raises(StudyError, match="the part of rig to judge has 64 samples, too few for two bands of 17 lines"):
-        local_force_error(local.fit.model, prediction)
+        local_force_error(local.fit.model, prediction.of(0))
 
 
 def test_noise_on_the_force_is_allowed_for_where_there_are_periods() -> None:
     made = record(periods=18, noise=0.1, on_force=0.2)
     comparison = compared(OPEN, made, estimator="errors_in_variables")
     assert all(abs(error) < 4.0 for error in off(comparison).values()), off(comparison)
-    assert comparison.force.inputs, "the rest of the comparison is as ever"
+    assert comparison.forces[0].inputs, "the rest of the comparison is as ever"
 
 
 def simulated(model: Model, noise: float, seed: int, samples: int = 8192) -> Record:

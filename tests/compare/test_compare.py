@@ -81,7 +81,7 @@ def test_without_noise_and_without_a_hidden_effect_nothing_is_called_missing() -
     record = simulate(model(**VALUES), drive(), DT, Integrator("rk4", 8))
     comparison = compared(model(), Record(DT, {"force": record["force"], "displacement": record["displacement"]}))
     assert comparison.prediction.error < 1e-3
-    assert comparison.force.total < 0.01
+    assert comparison.forces[0].total < 0.01
     assert "unexplained lies" not in comparison_in_words(comparison)
 
 
@@ -265,4 +265,4 @@ def test_force_and_acceleration_alone_leave_the_band_below_the_cutoff_out() -> N
     assert comparison.prediction.low == 0.5
     assert comparison.prediction.error < 0.02  # the drift is 14 %
     assert all(b.low >= 0.4 for b in comparison.bands)
-    assert not comparison.force.band[comparison.force.frequency < 0.5].any()
+    assert not comparison.forces[0].band[comparison.forces[0].frequency < 0.5].any()

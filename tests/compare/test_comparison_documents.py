@@ -96,7 +96,7 @@ def test_the_document_has_the_fields_of_the_issue_and_is_plain_json() -> None:
     content = json.loads(as_json(comparison_document([comparison])))
     assert set(content) >= {"model", "error", "noise_floor", "coefficients", "where", "says"}
     assert content["error"]["response"] == comparison.prediction.error
-    assert content["error"]["force"] == comparison.force.total
+    assert content["error"]["force"] == comparison.forces[0].total
     assert set(content["where"]) == {"frequency", "amplitude", "time", "level"}
     assert content["where"]["frequency"][0]["of"] == "response"
     assert content["where"]["amplitude"][0]["of"] == "velocity"

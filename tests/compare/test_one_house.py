@@ -2,22 +2,26 @@
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from study.compare.comparison import Comparison, compare
-from study.compare.comparison_report import as_json, comparison_document
+from study.compare.by_estimator import FREE_RUN
+from study.compare.comparison import Comparison, across_records, compare
+from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
+from study.compare.each_record import levels_by_record, rows, separated
 from study.diagnose.adding import added
-from study.diagnose.diagnosis_files import diagnosis_files
+from study.diagnose.diagnosis_files import diagnosis_files, diagnosis_in_words
 from study.diagnose.verdict import Diagnosis, diagnose
 from study.equations.model import Model, free
 from study.equations.place import Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
+from study.explore.saved import of_comparison
 from study.faults.accounting import Accounted
 from study.faults.fault import FaultSettings
 from study.records.excitation import Excitation, force
@@ -155,6 +159,72 @@ def test_the_diagnosis_is_the_same(pair: Told) -> None:
     assert one.candidates[0].term.name == "cubic_stiffness"
 
 
+def colours() -> Record:
+    """The linear structure with noise of a colour, with which a fit of the true model is weighted."""
+    drive, rng = force(Excitation(), N, DT, 3), np.random.default_rng(4)
+    u = simulate(HARD.with_values({"k3": 0.0}), drive, DT, Integrator("rk4", 4))["displacement"]
+    noise = lfilter([1.0], [1.0, -0.95], rng.standard_normal(N))
+    return Record(DT, {"force": drive, "displacement": u + 0.1 * np.std(u) / np.std(noise) * noise}, name="coloured")
+
+
+def spiky() -> Record:
+    """With spikes, an offset, and the hardening spring that the model lacks."""
+    record, rng = shaken(), np.random.default_rng(6)
+    u = record["displacement"].copy()
+    u[rng.choice(N, 8, replace=False)] += 8.0 * np.std(u)
+    return record.with_channels({"displacement": u + 0.3 * np.std(u)})
+
+
+def blown() -> Record:
+    """Blows of a hammer."""
+    drive, rng = force(Excitation("blows", level=8.0, blows=24), N, DT, 7), np.random.default_rng(8)
+    u = simulate(HARD, drive, DT, Integrator("rk4", 8))["displacement"]
+    noisy = u + 0.005 * np.std(u) * rng.standard_normal(N)
+    return Record(DT, {"force": drive, "displacement": noisy}, name="blows")
+
+
+def component() -> Record:
+    """Spring and damper alone, their motion prescribed and the force measured."""
+    u, rng = shaken(noise=0.0)["displacement"], np.random.default_rng(9)
+    v = np.gradient(u, DT)
+    load = VALUES["c"] * v + VALUES["k"] * u + VALUES["k3"] * u**3
+    noisy = load + 0.01 * np.std(load) * rng.standard_normal(N)
+    return Record(DT, {"force": noisy, "displacement": u, "velocity": v}, name="part")
+
+
+def without_inertia(model: Model) -> Model:
+    return replace(model, terms=model.terms[1:])
+
+
+def compared(records: Sequence[Record], model: Model, **more: Any) -> Accounted:
+    return compare_records(records, model, Layout(), PLAIN, **more)
+
+
+MORE: dict[str, Callable[[], tuple[Accounted, Accounted]]] = {
+    "noise of a colour": lambda: (compared([colours()], ALONE), compared([named(colours())], NAMED)),
+    "spikes": lambda: (compare_records([spiky()], ALONE), compare_records([named(spiky())], NAMED)),
+    "blows": lambda: (compared([blown()], ALONE), compared([named(blown())], NAMED)),
+    "component": lambda: (
+        compared([component()], without_inertia(ALONE)),
+        compared([with_its_velocity(component())], without_inertia(NAMED)),
+    ),
+    "local polynomials": lambda: (
+        compared([shaken()], ALONE, estimator="local_polynomial"),
+        compared([named(shaken())], NAMED, estimator="local_polynomial"),
+    ),
+}
+
+
+def with_its_velocity(record: Record) -> Record:
+    motions = {Sensor("x", motion): record[motion] for motion in ("displacement", "velocity")}
+    return record_of(DT, {"shaker": record["force"]}, motions, name=record.name)
+
+
+@pytest.fixture(scope="module", params=MORE)
+def further(request: pytest.FixtureRequest) -> tuple[Accounted, Accounted]:
+    return MORE[request.param]()
+
+
 def leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Every value of a document with where it stands, labels taken off its words."""
     if isinstance(content, dict):
@@ -164,35 +234,92 @@ def leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         for k, value in enumerate(content):
             yield from leaves(value, f"{path}.{k}")
     else:
-        path, words = (re.sub(r"\[(ground-)?x\]|\bx(:)? (?=displacement|velocity|acceleration)", "", t)
-                       for t in (path, content if isinstance(content, str) else ""))  # fmt: skip
-        yield path, words.replace("shaker", "force") if isinstance(content, str) else content
+        yield unlabelled(path), unlabelled(content) if isinstance(content, str) else content
 
 
-# What is not yet the same. In other words: the equation, sentences that name places, sizes by sensor. In content: a
-# structure's error of the force is what its equation of motion leaves by coordinate, not what no linear system of
-# its terms explains; and it has no noise floor of the force, no band of frequencies, and no envelope of a decay.
-TOLD_OTHERWISE = re.compile(
-    r"model[.](equation|terms)|says$|error(_of_fitted_coefficients)?[.]force$|noise_floor[.](force|response_error|from)"
-    r"|rms[.]|above_noise[.]standard_errors|decay[.]|.*tied_with[.]|where[.]frequency[.]"
-)
+def unlabelled(words: str) -> str:
+    """Words without the names of the coordinate, of its force and of the places."""
+    words = re.sub(r", (at: x|between: \[ground, x\])(?=[,}])|\[(ground-)?x\]", "", words)
+    words = re.sub(r"\bx:? (?=displacement|velocity|acceleration|force)", "", words)
+    words = re.sub(r" (at x|between the ground and x)\b|(?<=; )between the ground and x ", "", words)
+    words = re.sub(r"^{term: (\w+)}$", r"\1", words)
+    return words.replace("at places", "").replace("effects and places", "candidates").replace("shaker", "force")
+
+
+def told_once(content: Any) -> Any:
+    """A document of the named coordinate with what names a place and an effect as the effect alone."""
+    if isinstance(content, list):
+        if content and all(isinstance(item, dict) and {"on", "explained"} <= {*item} for item in content):
+            return {item["on"]: item["explained"] for item in content}
+        return [told_once(item) for item in content]
+    if not isinstance(content, dict):
+        return content
+    if {*content} in ({"term", "at"}, {"term", "between"}):
+        return content["term"]
+    return {key: told_once(value) for key, value in content.items()}
+
+
+def same_but_for_labels(one: bytes, other: bytes) -> None:
+    """Whether all that is told of a single mass is told of the named coordinate: a structure may tell more."""
+    again, count = dict(leaves(told_once(json.loads(other)))), 0
+    for path, value in leaves(json.loads(one)):
+        if path.endswith("model.equation"):  # a structure has one for each coordinate
+            continue
+        count += 1
+        if isinstance(value, float) and again[path] is not None:
+            assert again[path] == pytest.approx(value, rel=1e-3, abs=1e-6), path
+        else:
+            assert again[path] == value, path
+    assert count > 20
 
 
 def test_the_json_is_the_same_but_for_labels(pair: Told) -> None:
-    for one, other in (
-        [as_json(comparison_document([c])) for c in pair.comparisons],
-        [diagnosis_files(d, "")["diagnosis.json"] for d in pair.diagnoses],
-    ):
-        named_ones, count = dict(leaves(json.loads(other))), 0
-        for path, value in leaves(json.loads(one)):
-            if TOLD_OTHERWISE.match(path):
-                continue
-            again, count = named_ones[path], count + 1
-            if isinstance(value, float) and again is not None:
-                assert again == pytest.approx(value, rel=1e-3, abs=1e-6), path
-            else:
-                assert again == value, path
-        assert count > 20
+    same_but_for_labels(*(as_json(comparison_document([c])) for c in pair.comparisons))
+    same_but_for_labels(*(written(d, a) for d, a in zip(pair.diagnoses, pair.accounted, strict=True)))
+
+
+def written(diagnosis: Diagnosis, accounted: Accounted) -> bytes:
+    return diagnosis_files(diagnosis, diagnosis_in_words(diagnosis), (), accounted.faults)["diagnosis.json"]
+
+
+def test_the_json_of_other_tests_and_estimators_is_the_same_but_for_labels(
+    further: tuple[Accounted, Accounted],
+) -> None:
+    same_but_for_labels(*(as_json(comparison_document([a.comparison])) for a in further))
+    assert [f.fault for f in further[0].faults] == [f.fault for f in further[1].faults]
+    if further[0].comparison.estimator == FREE_RUN:
+        same_but_for_labels(*(written(diagnose(a.comparison), a) for a in further))
+
+
+def test_several_records_are_told_the_same_each_by_itself_and_with_coefficients_of_their_own() -> None:
+    records = [shaken(), shaken(0.3, seed=7)]
+    told_of = list[bytes](), list[bytes]()
+    for model, given, found in zip((ALONE, NAMED), (records, [named(r) for r in records]), told_of, strict=True):
+        apart = [compared([record], model).comparison for record in given]
+        found.append(as_json(comparison_document(apart, across_records(apart))))
+        own, marked, separate = separated(model, given, ["linear_damping"])
+        together = compared(marked, own).comparison
+        levels = rows(levels_by_record(together, separate, given), given)
+        found.append(as_json({**comparison_document([together]), "coefficients_by_record": levels}))
+    for one, other in zip(*told_of, strict=True):
+        same_but_for_labels(one, other)
+
+
+def test_the_tables_and_the_page_tell_of_the_coordinate_what_they_tell_of_the_mass(pair: Told) -> None:
+    one, other = ([[c.strip() for c in re.split(r"  +", unlabelled(line))]
+                   for line in comparison_summary([c]).splitlines()] for c in pair.comparisons)  # fmt: skip
+    at, again = (next(i for i, row in enumerate(rows) if "response error" in row) for rows in (one, other))
+    (heads, values), (others, again_values) = (
+        ([head for head in rows[i] if head], rows[i + 2]) for rows, i in ((one, at), (other, again))
+    )
+    assert "force error" in heads
+    told_too = dict(zip(others, again_values, strict=True))
+    assert values[-len(heads) :] == [told_too[head] for head in heads]
+    files = [tables([c]) for c in pair.comparisons]
+    assert files[1].keys() >= files[0].keys()
+    panels = [{*re.findall(r'data-panel="(\w+)"', of_comparison(c).decode())} for c in pair.comparisons]
+    assert panels[0] <= panels[1]
+    assert "force" in panels[0]
 
 
 def test_a_structure_of_one_coordinate_is_compared_and_added_to_like_a_mass() -> None:
