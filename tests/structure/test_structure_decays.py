@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 from study.compare.comparison import compare
+from study.compare.comparison_pictures import comparison_pictures
+from study.compare.comparison_report import comparison_document
+from study.compare.decay import decays_of
 from study.diagnose.verdict import MISSING, NOTHING, diagnose
 from study.equations.free_run import prepare
+from study.equations.linear_part import modes_of
 from study.equations.model_file import parse_model
 from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.plan import make_plan
@@ -16,7 +20,7 @@ from study.records.prepared import prepare_record
 from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
 from study.support.errors import StudyError
-from study.way_in.compare_records import made_ready
+from study.way_in.compare_records import compare_records, made_ready
 
 DT, SAMPLES = 0.01, 2000
 SENSORS = (Sensor("a", "displacement"), Sensor("b", "displacement"))
@@ -150,3 +154,18 @@ def test_stretches_that_are_named_are_used_alone():
 def test_parts_that_cannot_be_are_refused(parts, said):
     with pytest.raises(StudyError, match=said):
         made_ready([decay()], model(), parts)
+
+
+def test_each_sensor_of_a_decay_shows_the_frequency_that_it_swings_in_most():
+    comparison = compare_records([decay(samples=4000)], model(), Layout()).comparison
+    modes = modes_of(model(known=True))
+    measured = [decays_of(comparison, i).measured for i in range(2)]
+    content = comparison_document([comparison])["decay"]
+    assert list(content) == ["a displacement", "b displacement"]
+    for number, seen in enumerate(measured):
+        late = seen.frequency[-3:]
+        assert min(abs(np.median(late) / modes.frequency - 1.0)) < 0.02, number
+        again = decays_of(comparison, number).predicted
+        assert again is not None
+        assert np.median(again.frequency) == pytest.approx(np.median(seen.frequency), rel=0.01)
+    assert {"decay.png", "force_error.png"} <= comparison_pictures(comparison).keys()

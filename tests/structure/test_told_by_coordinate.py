@@ -1,18 +1,13 @@
-"""What is told of a single mass is told of each coordinate: the error of its force, and how its motion decays."""
+"""What is told of a single mass is told of each coordinate: the error of the force in its equation."""
 
 import json
 
 import numpy as np
 import pytest
-from test_structure_decays import BEGIN, DT, HARD, decay, model
 
 from study.compare.comparison import compare
 from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
-from study.compare.decay import decays_of
-from study.equations.linear_part import modes_of
 from study.records.prepared import prepare_record
-from study.records.record_layout import Layout
-from study.way_in.compare_records import compare_records, made_ready
 
 
 @pytest.fixture(scope="module")
@@ -45,17 +40,3 @@ def test_files_tell_it_by_coordinate(compared):
         assert content[of]["force"] == pytest.approx(np.mean(list(content[of]["coordinates"].values())))
     assert {f"force at {floor}" for floor in floors} <= {band["of"] for band in content["where"]["frequency"]}
     assert tables([compared])["force_error"].decode().startswith("record,coordinate,frequency,force_density")
-
-
-def test_each_sensor_of_a_decay_shows_the_frequency_that_it_swings_in_most():
-    comparison = compare_records([decay(samples=4000)], model(), Layout()).comparison
-    modes = modes_of(model(known=True))
-    measured = [decays_of(comparison, i).measured for i in range(2)]
-    content = comparison_document([comparison])["decay"]
-    assert list(content) == ["a displacement", "b displacement"]
-    for number, seen in enumerate(measured):
-        late = seen.frequency[-3:]
-        assert min(abs(np.median(late) / modes.frequency - 1.0)) < 0.02, number
-        again = decays_of(comparison, number).predicted
-        assert again is not None
-        assert np.median(again.frequency) == pytest.approx(np.median(seen.frequency), rel=0.01)
