@@ -133,7 +133,7 @@ def test_the_true_model_is_as_good_as_the_noise_after_the_effect_is_added() -> N
     after = compared(made.believed.with_term(get("quadratic_damping")), made.record)
     assert after.prediction.of(0).noise.alone
     assert after.prediction.error < 0.7 * before.prediction.error
-    assert after.force.total < before.force.total
+    assert after.forces[0].total < before.forces[0].total
 
 
 def test_a_shape_parameter_left_out_is_estimated() -> None:

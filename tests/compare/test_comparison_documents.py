@@ -73,7 +73,7 @@ def test_units_change_neither_errors_nor_sentences(
     )
     one, other = compared(model(), record), compared(model(), replace(scaled, name=record.name))
     assert other.prediction.error == pytest.approx(one.prediction.error, rel=1e-6)
-    assert other.force.total == pytest.approx(one.force.total, rel=1e-6)
+    assert other.forces[0].total == pytest.approx(one.forces[0].total, rel=1e-6)
     assert other.prediction.floor == pytest.approx(one.prediction.floor, rel=1e-6)
     assert comparison_in_words(other) == comparison_in_words(one)
     assert {c.key: c.unit for c in other.coefficients}["k"] == f"{force_unit}/{length_unit}"

@@ -69,7 +69,7 @@ def test_the_sketch_has_a_line_for_every_connection():
 
 def test_compare_draws_every_picture_and_the_page(compared):
     wanted = {"structure", "sensors", "response", "shared_force", "modes", "restoring_forces"}
-    wanted |= {"missing_force", "error_in_time"}
+    wanted |= {"missing_force", "error_in_time", "force_error"}
     assert {p.stem for p in compared.glob("*.png")} == wanted == {p.stem for p in compared.glob("*.svg")}
     where = json.loads((compared / "comparison.json").read_text())["where"]
     assert set(where["maps"]) == {
