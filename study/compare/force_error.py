@@ -90,6 +90,7 @@ class JudgedEquation:
     """One equation of motion along the judging part; n samples, q inputs."""
 
     inputs: tuple[Input, ...]
+    whole: tuple[Input, ...]  # the same with inertia, where that takes the place of the force
     channels: tuple[Floats, ...]  # histories of the inputs, response, and force; q + 2 arrays of shape (n,)
 
 
@@ -101,7 +102,7 @@ def judged_equation(
     Inertia takes the place of the force along a ``span`` of the record without one, or of a record of ``free`` decays.
     """
     prepared, coordinate, part = view.prepared, view.sensor.coordinate, slice(*span)
-    inputs = with_known_changes(reverse_inputs(model, coordinate), model)
+    whole = inputs = with_known_changes(reverse_inputs(model, coordinate), model)
     seen = model.coordinates if model.prescribed else prepared.coordinates
     directions = np.array([i.direction for i in inputs]).reshape(-1, len(model.coordinates))
     if not {c for c, weights in zip(model.coordinates, directions.T, strict=True) if np.any(weights)} <= {*seen}:
@@ -120,7 +121,7 @@ def judged_equation(
         return None
     moved = {d: along(d, model, record) for d in {i.direction for i in inputs}}
     channels = [*(histories((i,), moved[i.direction])[0] for i in inputs), record[view.sensor], force]
-    return JudgedEquation(inputs, tuple(channel[part] for channel in channels))
+    return JudgedEquation(inputs, whole, tuple(channel[part] for channel in channels))
 
 
 Judge = Callable[[Model, SensorPrediction], ForceError | None]  # of one equation
@@ -186,7 +187,7 @@ def force_error(model: Model, view: SensorPrediction) -> ForceError | None:
         force=result.output,
         unexplained=np.clip((1.0 - result.multiple) * freedom, 0.0, 1.0),
         parametric=_left(reverse, inputs, model) / force,
-        noise=from_noise(matrix.frequency, inputs, model, view) / force,
+        noise=from_noise(matrix.frequency, equation.whole, model, view) / force,
         cumulative=result.cumulative,
         inputs=inputs,
         band=lines_to_judge(matrix.frequency, response, density, result.output, prepared.band[0]),
@@ -210,7 +211,7 @@ def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floa
 
 
 def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, view: SensorPrediction) -> Floats:
-    """Density of force that noise on the responses makes through the linear terms of an equation.
+    """Density of force that noise on the responses makes through the linear terms of an equation, inertia too.
 
     Where the force itself is the response, that of its own noise.
     """

@@ -63,7 +63,7 @@ def local_force_error(model: Model, view: SensorPrediction) -> ForceError | None
         force=force,
         unexplained=shares[-1],
         parametric=_over(_with_zero(rest * lines.density), force),
-        noise=_over(from_noise(frequency, inputs, model, view), force),
+        noise=_over(from_noise(frequency, equation.whole, model, view), force),
         cumulative=np.maximum.accumulate(1.0 - shares, axis=0),
         inputs=inputs,
         band=lines_to_judge(

@@ -40,3 +40,11 @@ def test_files_tell_it_by_coordinate(compared):
         assert content[of]["force"] == pytest.approx(np.mean(list(content[of]["coordinates"].values())))
     assert {f"force at {floor}" for floor in floors} <= {band["of"] for band in content["where"]["frequency"]}
     assert tables([compared])["force_error"].decode().startswith("record,coordinate,frequency,force_density")
+
+
+def test_noise_alone_leaves_as_much_as_is_said(frame, record_of):
+    """Of the true model, whose equations at floor2 and floor3 have no force but that of inertia."""
+    true = frame.with_values(dict.fromkeys(frame.values, None))
+    found = {force.coordinate: force for force in compare(true, prepare_record(record_of(noise=1e-4))).forces}
+    for floor in ("floor2", "floor3"):
+        assert found[floor].parametric_total == pytest.approx(found[floor].noise_total, rel=0.25)
