@@ -14,7 +14,7 @@ from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
 from study.compare.fitted_coefficients import Level
 from study.compare.force_map import curve, surface
-from study.compare.place_pictures import place_figures, responses_figure
+from study.compare.place_pictures import SENSORS, place_figures, responses_figure
 from study.compare.varying_pictures import varying_figure
 from study.equations.place import place_in_words
 from study.figures import coherence, page
@@ -25,7 +25,6 @@ from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
 WIDE = 7.2  # inches
-EQUATIONS = 6  # in a picture, at most
 
 
 def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
@@ -82,7 +81,7 @@ def force_error_figure(comparison: Comparison) -> Figure:
 
     Of a structure in the equations that leave most of it, a row each.
     """
-    forces = sorted(comparison.forces, key=lambda force: -force.total)[:EQUATIONS]
+    forces = sorted(comparison.forces, key=lambda force: -force.total)[:SENSORS]
     ends = np.array([force.frequency[force.band][[0, -1]] for force in forces])
     about = f"{percent(comparison.force_error)} of its power from {np.min(ends):.3g} to {np.max(ends):.3g} Hz"
     columns = min(len(forces), 2)

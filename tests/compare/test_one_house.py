@@ -287,7 +287,11 @@ def test_the_json_of_other_tests_and_estimators_is_the_same_but_for_labels(
 ) -> None:
     same_but_for_labels(*(as_json(comparison_document([a.comparison])) for a in further))
     assert [f.fault for f in further[0].faults] == [f.fault for f in further[1].faults]
-    if further[0].comparison.estimator == FREE_RUN:
+
+
+@pytest.mark.long
+def test_the_diagnosis_of_other_tests_is_the_same_but_for_labels(further: tuple[Accounted, Accounted]) -> None:
+    if further[0].comparison.estimator == FREE_RUN:  # the only one that a diagnosis goes on from
         same_but_for_labels(*(written(diagnose(a.comparison), a) for a in further))
 
 

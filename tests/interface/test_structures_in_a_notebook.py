@@ -90,8 +90,8 @@ def test_what_does_not_go_is_said_in_a_sentence(fit):
         st.term("linear_stiffness", at="a", between=("a", "b"))
     with pytest.raises(StudyError, match="'c'"):
         pair(st.term("cubic_stiffness", between=("a", "c")))
-    with pytest.raises(StudyError, match="single mass"):
-        fit.plot_frf()
+    with pytest.raises(StudyError, match="coordinate is 'c'; expected one of a, b"):
+        fit.plot_force_error(coordinate="c")
     with pytest.raises(StudyError, match="identify reads a single mass in reverse"):
         st.identify(st.Record.of(fit.comparison.record), fit.given)
     with pytest.raises(StudyError, match="has no 'shaker'; expected every force of pair"):
@@ -112,3 +112,11 @@ def test_a_structure_is_simulated_and_its_fit_predicts(fit):
     assert abs(np.corrcoef(added_noise)[0, 1]) < 0.1
     assert "shaker" in record.plot_spectrum().get_ylabel()
     plt.close("all")
+
+
+def test_response_functions_and_the_error_of_the_force_are_drawn_of_each_coordinate(fit):
+    for of in ("a", "b"):
+        assert fit.plot_frf(sensor=f"{of} displacement").lines
+        assert fit.plot_force_error(coordinate=of).lines
+    assert fit.plot_frf().lines
+    assert fit.plot_force_error().lines
