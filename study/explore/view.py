@@ -25,6 +25,7 @@ from study.equations.coefficient_units import units_at
 from study.equations.place import HERE, Place
 from study.explore import axes, check_columns, decimate, place_words, record_words, words
 from study.explore.axis_scales import LEAST, Columns, Focus, heard, rms_force, within
+from study.explore.check_columns import NINETY_FIVE
 from study.explore.page_units import in_text, power
 from study.explore.session import Session, Stage, on_record
 from study.figures.labels import power_of_ten, term_names
@@ -32,7 +33,6 @@ from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
 from study.support.arrays import Floats
 
-NINETY_FIVE = 1.96  # standard errors to each side
 DASH = 5.0  # pixels
 DASHES = ("solid", "dashed", "dotdash", "dotted", "dashdot")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#333333", "#E69F00")
