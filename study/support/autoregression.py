@@ -7,6 +7,7 @@ import numpy as np
 from study.support.arrays import Floats
 
 PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
+AT_A_TIME = 1 << 14  # samples that are filtered at a time: they stay in the cache
 
 
 def autoregression(noise: Floats) -> Floats:
@@ -26,10 +27,12 @@ def autoregression(noise: Floats) -> Floats:
 def whitened(values: Floats, coefficients: Floats) -> Floats:
     """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape."""
     order = len(coefficients) - 1
-    padded = np.concatenate([np.broadcast_to(values[:1], (order, *values.shape[1:])), values])
-    total = coefficients[0] * values
-    for k in range(1, order + 1):  # SciPy's signal package takes longer to load than this takes
-        total = total + coefficients[k] * padded[order - k : len(padded) - k]
+    total, before = coefficients[0] * values, np.broadcast_to(values[:1], (order, *values.shape[1:]))
+    for begin in range(0, len(values), AT_A_TIME):  # SciPy's signal package takes longer to load than this takes
+        padded, part = np.concatenate([before, values[begin : begin + AT_A_TIME]]), total[begin : begin + AT_A_TIME]
+        for k in range(1, order + 1):
+            part += coefficients[k] * padded[order - k : len(padded) - k]
+        before = padded[len(padded) - order :]
     return total
 
 

@@ -1,9 +1,13 @@
 """Normal equations of pieces against those of the whole matrix."""
 
+import tracemalloc
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from study.support.levenberg_marquardt import ContinuityGaps, point_at
+from study.support import levenberg_marquardt
+from study.support.levenberg_marquardt import ContinuityGaps, normal_equations, point_at
 
 
 def test_own_variables_are_eliminated_exactly() -> None:
@@ -34,3 +38,25 @@ def test_own_variables_are_eliminated_exactly() -> None:
         assert point.normal.decrement() == pytest.approx(fall, rel=1e-9)
         variance = np.sum(right**2) / ((48 if tied else 40) - len(x))
         np.testing.assert_allclose(point.covariance(), variance * np.linalg.inv(whole.T @ whole)[:k, :k], rtol=1e-7)
+
+
+@pytest.mark.parametrize("begins", [(0,), (0, 3, 40, 41, 120, 300), tuple(range(0, 500, 7))])
+def test_a_few_rows_at_a_time_are_all_of_them(begins: Sequence[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(5)
+    jacobian, residual = random.standard_normal((500, 5)), random.standard_normal(500)
+    scale, whole = normal_equations(residual, jacobian, 3, begins)
+    monkeypatch.setattr(levenberg_marquardt, "ROWS", 64)
+    again, parts = normal_equations(residual, jacobian, 3, begins)
+    np.testing.assert_allclose(again, scale, rtol=1e-14)
+    for name in ("shared", "cross", "own", "right", "own_right"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize("apart", [400_000, 50])
+def test_a_long_jacobian_is_not_copied(apart: int) -> None:
+    jacobian, residual = np.ones((400_000, 7)), np.ones(400_000)
+    tracemalloc.start()
+    normal_equations(residual, jacobian, 5, range(0, 400_000, apart))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < jacobian.nbytes
