@@ -28,7 +28,6 @@ from study.support.recent import Recent
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
 ROUGH = 0.5  # largest step times the fastest rate
 FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
-ROOM = 1 << 27  # bytes of what drives that are kept for the next run
 FEWEST, MOST = 4, 32  # steps a sample between which the median rate sets the bound
 Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
@@ -296,7 +295,7 @@ def _between(values: bytes, factor: int, reading: str) -> Floats:
         return _FORCES.get((values, factor, reading), len(values) * (1 + factor), made)
 
 
-_FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(ROOM), Recent(ROOM), Lock()
+_FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(), Recent(), Lock()
 
 
 def predict_response(

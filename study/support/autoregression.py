@@ -7,7 +7,6 @@ import numpy as np
 from study.support.arrays import Floats
 
 PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
-AT_A_TIME = 1 << 14  # samples that are filtered at a time: they stay in the cache
 
 
 def autoregression(noise: Floats) -> Floats:
@@ -24,12 +23,15 @@ def autoregression(noise: Floats) -> Floats:
     return best
 
 
-def whitened(values: Floats, coefficients: Floats) -> Floats:
-    """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape."""
+def whitened(values: Floats, coefficients: Floats, at_a_time: int = 1 << 14) -> Floats:
+    """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape.
+
+    So many samples are filtered ``at_a_time``: they stay in the cache.
+    """
     order = len(coefficients) - 1
     total, before = coefficients[0] * values, np.broadcast_to(values[:1], (order, *values.shape[1:]))
-    for begin in range(0, len(values), AT_A_TIME):  # SciPy's signal package takes longer to load than this takes
-        padded, part = np.concatenate([before, values[begin : begin + AT_A_TIME]]), total[begin : begin + AT_A_TIME]
+    for begin in range(0, len(values), at_a_time):  # SciPy's signal package takes longer to load than this takes
+        padded, part = np.concatenate([before, values[begin : begin + at_a_time]]), total[begin : begin + at_a_time]
         for k in range(1, order + 1):
             part += coefficients[k] * padded[order - k : len(padded) - k]
         before = padded[len(padded) - order :]

@@ -23,7 +23,6 @@ from study.support.least_squares import INDISTINCT
 OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
 ROUNDING = 1e-11  # share of the response that a step changes at which a search has converged too
 PATIENCE = 8  # trials that may pass without lowering the error by what matters
-ROWS = 1 << 16  # of a Jacobian that are multiplied at a time
 MATTERS = 1e-3  # fall of the error that matters, as a share of what a step of one standard error brings
 
 
@@ -100,14 +99,14 @@ def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> F
     return np.asarray(solved, dtype=np.float64).reshape(count, f, m)
 
 
-def _products(jacobian: Floats, residual: Floats, begins: Sequence[int]) -> Floats:
+def _products(jacobian: Floats, residual: Floats, begins: Sequence[int], at_a_time: int = 1 << 16) -> Floats:
     """``X^T X`` of the rows X of each segment, Jacobian and residual side by side, shape (N, columns, columns).
 
-    ``ROWS`` at a time, so that a long record's Jacobian is not copied as a whole.
+    So many rows ``at_a_time``, so that a long record's Jacobian is not copied as a whole.
     """
-    firsts = range(0, len(residual), ROWS)
+    firsts = range(0, len(residual), at_a_time)
     if len(begins) == 1:
-        parts = (np.column_stack([jacobian[i : i + ROWS], residual[i : i + ROWS]]) for i in firsts)
+        parts = (np.column_stack([jacobian[i : i + at_a_time], residual[i : i + at_a_time]]) for i in firsts)
         return np.asarray(sum(rows.T @ rows for rows in parts), dtype=np.float64)[None]
     bounds = np.array([*begins, len(residual)])
     block = min(int(np.max(np.diff(bounds))), 32)

@@ -12,7 +12,7 @@ class Recent:
     there at once.
     """
 
-    def __init__(self, room: int, most: int = 8) -> None:
+    def __init__(self, room: int = 1 << 27, most: int = 8) -> None:
         self.room, self.most = room, most  # bytes, results
         self._kept: OrderedDict[Hashable, tuple[int, Any]] = OrderedDict()
 

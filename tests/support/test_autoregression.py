@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from study.support import autoregression as autoregression_module
 from study.support.autoregression import autoregression, whitened
 
 
@@ -45,11 +44,10 @@ def test_columns_are_filtered_as_one_is():
 
 
 @pytest.mark.parametrize("order", [0, 1, 7])
-def test_a_few_samples_at_a_time_are_all_of_them(order, monkeypatch):
+def test_a_few_samples_at_a_time_are_all_of_them(order):
     values, coefficients = np.random.default_rng(6).standard_normal((200, 2)), np.arange(1.0, order + 2.0)
     whole = whitened(values, coefficients)
-    monkeypatch.setattr(autoregression_module, "AT_A_TIME", 16)
-    assert np.array_equal(whitened(values, coefficients), whole)
+    assert np.array_equal(whitened(values, coefficients, at_a_time=16), whole)
 
 
 def test_a_long_record_is_filtered_without_copies_of_it():
