@@ -53,16 +53,23 @@ class Prediction:
         """The response as measured, shape (n, s)."""
         return self.prepared.measured[slice(*self.prepared.plan.judge)]
 
-    @cached_property
+    @property
     def misfit(self) -> Floats:
-        """Measured minus predicted response at all frequencies, zero where a sample is lost, shape (n, s)."""
+        """Measured minus predicted response at all frequencies, zero where a sample is lost, shape (n, s).
+
+        Made whenever it is asked for: kept by every candidate, it would be most of what a long record takes.
+        """
         left = self.measured - self.predicted
         kept = self.prepared.known(np.ones(left.size), self.prepared.plan.judge)
         return left * kept.reshape(left.shape)
 
-    @cached_property
+    @property
     def residual(self) -> Floats:
         """The same without what lies below ``low``, stacked as that of a fit is, shape (n s,)."""
+        return self._filtered if self.low > 0.0 else self.prepared.outputs.stacked(self.misfit)
+
+    @cached_property
+    def _filtered(self) -> Floats:
         return self.above(self.prepared.outputs.stacked(self.misfit))
 
     @cached_property
@@ -129,6 +136,8 @@ class Prediction:
 
     def above(self, stacked: Floats) -> Floats:
         """Stacked values of the judging or fitting part without what lies below ``low``, the same shape."""
+        if self.low == 0.0:
+            return stacked
         columns = stacked.reshape(-1, len(self.prepared.outputs)).T
         return np.stack([_above(values, self.prepared) for values in columns], axis=1).reshape(stacked.shape)
 
@@ -175,9 +184,13 @@ class SensorPrediction:
         """Measured minus predicted response at all frequencies, zero where a sample is lost."""
         return self.whole.misfit[:, self.number]
 
-    @cached_property
+    @property
     def residual(self) -> Floats:
         """The difference without what lies below ``low``, in the unit of the sensor."""
+        return self._filtered if self.whole.low > 0.0 else self.difference
+
+    @cached_property
+    def _filtered(self) -> Floats:
         return _above(self.difference, self.prepared)
 
     @cached_property

@@ -9,8 +9,8 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
+from threading import Lock
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError, expect
+from study.support.recent import Recent
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
 ROUGH = 0.5  # largest step times the fastest rate
@@ -250,41 +251,51 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
     columns = [_between(record[name].tobytes(), factor, record.reading(name))[part] for name in driving]
-    drive = np.column_stack(columns) if columns else np.zeros((factor * (last - first), 0))
+    drive = _side_by_side(columns) if columns else np.zeros((factor * (last - first), 0))
     return drive, ((0, record.start + first * record.dt),), None
 
 
-@lru_cache(maxsize=8)
 def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int) -> Drive:
     """As :func:`along_motions`, of a record that is strung together."""
-    part = record.part(*span)
-    runs, places = runs_of(part)
-    starts, begin = list[tuple[int, float]](), 0
-    for run in runs:
-        starts.append((begin, float(run.source.time[run.first])))
-        begin += len(run)
-    columns = [between_runs(part, name, factor) for name in driving]
-    drive = np.column_stack(columns) if columns else np.zeros((factor * begin, 0))
-    drive.flags.writeable = False
-    return drive, tuple(starts), places
+
+    def made() -> Drive:
+        part = record.part(*span)
+        runs, places = runs_of(part)
+        starts, begin = list[tuple[int, float]](), 0
+        for run in runs:
+            starts.append((begin, float(run.source.time[run.first])))
+            begin += len(run)
+        columns = [between_runs(part, name, factor) for name in driving]
+        drive = _side_by_side(columns) if columns else np.zeros((factor * begin, 0))
+        drive.flags.writeable = False
+        return drive, tuple(starts), places
+
+    size = 8 * (len(record) * len(record.channels) + (span[1] - span[0]) * (1 + factor * len(driving)))
+    with _ONE_AT_A_TIME:
+        return _MOTIONS.get((record, span, driving, factor), size, made)
+
+
+def _side_by_side(columns: Sequence[Floats]) -> Floats:
+    """Columns, shape (n, columns); a single one as it is kept, which no run changes."""
+    return columns[0][:, None] if len(columns) == 1 else np.column_stack(columns)
 
 
 def _between(values: bytes, factor: int, reading: str) -> Floats:
     """A channel between its samples; a diagnosis makes hundreds of runs under the same force.
 
-    Of long ones two are kept: each takes as many megabytes as all else that is known of a record.
+    Threads wait for each other: two fits of one record ask for the same.
     """
-    long = len(values) * factor > 1 << 24  # bytes
-    return (_between_few if long else _between_many)(values, factor, reading)
+
+    def made() -> Floats:
+        fine = between_samples(np.frombuffer(values), factor, reading)
+        fine.flags.writeable = False
+        return fine
+
+    with _ONE_AT_A_TIME:
+        return _FORCES.get((values, factor, reading), len(values) * (1 + factor), made)
 
 
-def _interpolated(values: bytes, factor: int, reading: str) -> Floats:
-    fine = between_samples(np.frombuffer(values), factor, reading)
-    fine.flags.writeable = False
-    return fine
-
-
-_between_many, _between_few = lru_cache(maxsize=8)(_interpolated), lru_cache(maxsize=2)(_interpolated)
+_FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(), Recent(), Lock()
 
 
 def predict_response(

@@ -57,7 +57,7 @@ class Outputs:
             return stacked
         values = stacked.reshape(len(stacked) // len(self.sensors), len(self.sensors), *stacked.shape[1:])
         parts = [whitened(values[:, i], own) for i, own in enumerate(noise)]
-        return np.stack(parts, axis=1).reshape(stacked.shape)
+        return (parts[0] if len(parts) == 1 else np.stack(parts, axis=1)).reshape(stacked.shape)
 
 
 def alone(motion: str) -> Outputs:

@@ -185,21 +185,23 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
     """Add ``X_i* X_j`` of the first ``count`` segments to ``total``, shape (lines, channels, channels)."""
     if count == 0:
         return
-    taper = cut.taper()
+    taper, products = cut.taper(), np.zeros_like(total)
     views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
     room = np.empty((len(views), CHUNK, cut.length))  # reused: fresh memory costs as much as a transform
     transformed = np.empty((len(views), CHUNK, len(total)), dtype=np.complex128)
     turned = np.empty((len(total), len(views), CHUNK), dtype=np.complex128)
-    mirrored = np.empty_like(turned)
     for first in range(0, count, CHUNK):
         size = min(CHUNK, count - first)
-        tapered, lines, conjugate = room[:, :size], turned[..., :size], mirrored[..., :size]
+        tapered, lines = room[:, :size], turned[..., :size]
         for view, out in zip(views, tapered, strict=True):
             np.multiply(view[first : first + size], taper, out=out)
         np.fft.rfft(tapered, out=transformed[:, :size])
         lines[:] = transformed[:, :size].transpose(2, 0, 1)
-        np.conjugate(lines, out=conjugate)
-        total += conjugate @ lines.transpose(0, 2, 1)
+        for i in range(len(views)):  # those of i with j are those of j with i, conjugated
+            products[:, i, i:] += np.vecdot(lines[:, i, None], lines[:, i:])
+    above, below = np.triu_indices(len(views), 1)
+    products[:, below, above] = products[:, above, below].conj()
+    total += products
 
 
 def autospectrum(values: Floats, dt: float, segments: Segments | None = None) -> tuple[Floats, Floats]:

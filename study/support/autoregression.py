@@ -23,13 +23,18 @@ def autoregression(noise: Floats) -> Floats:
     return best
 
 
-def whitened(values: Floats, coefficients: Floats) -> Floats:
-    """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape."""
+def whitened(values: Floats, coefficients: Floats, at_a_time: int = 1 << 14) -> Floats:
+    """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape.
+
+    So many samples are filtered ``at_a_time``: they stay in the cache.
+    """
     order = len(coefficients) - 1
-    padded = np.concatenate([np.broadcast_to(values[:1], (order, *values.shape[1:])), values])
-    total = coefficients[0] * values
-    for k in range(1, order + 1):  # SciPy's signal package takes longer to load than this takes
-        total = total + coefficients[k] * padded[order - k : len(padded) - k]
+    total, before = coefficients[0] * values, np.broadcast_to(values[:1], (order, *values.shape[1:]))
+    for begin in range(0, len(values), at_a_time):  # SciPy's signal package takes longer to load than this takes
+        padded, part = np.concatenate([before, values[begin : begin + at_a_time]]), total[begin : begin + at_a_time]
+        for k in range(1, order + 1):
+            part += coefficients[k] * padded[order - k : len(padded) - k]
+        before = padded[len(padded) - order :]
     return total
 
 

@@ -19,7 +19,7 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -
 
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
-    peak = np.max(np.abs(columns), axis=0, initial=0.0)
+    peak = np.maximum(np.max(columns, axis=0, initial=0.0), -np.min(columns, axis=0, initial=0.0))
     least = np.sqrt(np.finfo(float).tiny) * np.max(peak, initial=0.0)  # the square of a larger amount may be no number
     peak = np.where(peak > least, peak, np.inf)  # first, so that no square overflows
     scale = peak * length_or_one(columns / peak)

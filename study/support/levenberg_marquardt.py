@@ -11,12 +11,13 @@ algebra than one in a single segment.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
 from study.support.least_squares import INDISTINCT
 
 OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
@@ -98,17 +99,32 @@ def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> F
     return np.asarray(solved, dtype=np.float64).reshape(count, f, m)
 
 
-def _products(rows: Floats, begins: Sequence[int]) -> Floats:
-    """``X^T X`` of the rows X of each segment, shape (N, columns, columns).
+def _products(jacobian: Floats, residual: Floats, begins: Sequence[int], at_a_time: int = 1 << 16) -> Floats:
+    """``X^T X`` of the rows X of each segment, Jacobian and residual side by side, shape (N, columns, columns).
+
+    So many rows ``at_a_time``, so that a long record's Jacobian is not copied as a whole.
+    """
+    firsts = range(0, len(residual), at_a_time)
+    if len(begins) == 1:
+        parts = (np.column_stack([jacobian[i : i + at_a_time], residual[i : i + at_a_time]]) for i in firsts)
+        return np.asarray(sum(rows.T @ rows for rows in parts), dtype=np.float64)[None]
+    bounds = np.array([*begins, len(residual)])
+    block = min(int(np.max(np.diff(bounds))), 32)
+    edges = [*np.unique(np.searchsorted(bounds[:-1], firsts)).tolist(), len(begins)]
+    groups = (bounds[first : last + 1] for first, last in pairwise(edges) if last > first)
+    return np.concatenate([_in_blocks(jacobian, residual, own, block) for own in groups])
+
+
+def _in_blocks(jacobian: Floats, residual: Floats, bounds: Ints, block: int) -> Floats:
+    """:func:`_products` of the segments between these bounds.
 
     Segments are cut to blocks of equal length, short ones padded with zeros: one product of all blocks together takes
     a sixth of the time of hundreds of small ones.
     """
-    if len(begins) == 1:
-        return np.asarray((rows.T @ rows)[None], dtype=np.float64)
-    lengths = np.diff([*begins, len(rows)])
-    block = min(int(np.max(lengths)), 32)
-    counts = -(-lengths // block)
+    part = slice(int(bounds[0]), int(bounds[-1]))
+    rows = np.column_stack([jacobian[part], residual[part]])
+    begins, lengths = bounds[:-1] - bounds[0], bounds[1:] - bounds[:-1]
+    counts: Ints = -(-lengths // block)
     first = np.cumsum(counts) - counts
     offset = block * (np.arange(np.sum(counts)) - np.repeat(first, counts))[:, None] + np.arange(block)
     inside = offset < np.repeat(lengths, counts)[:, None]
@@ -141,7 +157,7 @@ def normal_equations(
         Length of each column, one where it is zero.
     normal : Normal
     """
-    products = _products(np.column_stack([jacobian, residual]), begins)
+    products = _products(jacobian, residual, begins)
     grams, rights = products[:, :-1, :-1], products[:, :-1, -1]
     links = None
     if continuity is not None:

@@ -1,15 +1,18 @@
 """A prediction of several sensors: each by itself, and all together."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from study.compare import noise
-from study.compare.prediction import Prediction
+from study.compare.prediction import Prediction, predict
+from study.equations.model import Model
+from study.identify.time_domain.fit_model import fit_model
 from study.records.plan import Plan
-from study.records.prepared import Prepared
-from study.records.record import Sensor, record_of
+from study.records.prepared import Prepared, prepare_record
+from study.records.record import Record, Sensor, record_of
 from study.support.arrays import Floats
 
 DT, PERIOD, PERIODS = 0.01, 1024, 4
@@ -76,3 +79,23 @@ def test_what_lies_below_the_cut_off_is_not_judged() -> None:
     above = predicted(left, low=0.5)
     assert above.error < 0.03
     assert np.sqrt(np.mean(above.residual**2)) == pytest.approx(above.error, rel=0.05)
+
+
+def test_no_history_is_kept_that_follows_from_the_prediction() -> None:
+    """Of a long record every candidate would keep it."""
+    found = predicted(noisy((0.02, 0.1)))
+    assert found.measured.shape == found.predicted.shape  # which the record keeps
+    tracemalloc.start()
+    assert found.error > 0.0
+    assert len(found.residual) == found.predicted.size
+    assert np.all(found.views[0].residual == found.views[0].difference)
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert kept < found.predicted.nbytes / 2
+
+
+def test_the_run_along_what_was_fitted_is_not_kept(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    prepared = prepare_record(records["linear"])
+    found = predict(fit_model(systems["linear"], prepared), prepared)
+    assert found.predicted.base is None
+    assert len(found.predicted) < len(records["linear"])

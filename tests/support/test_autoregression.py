@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -39,3 +41,19 @@ def test_columns_are_filtered_as_one_is():
     each = np.column_stack([whitened(column, filter_) for column in columns.T])
     assert np.allclose(whitened(columns, filter_), each)
     assert np.allclose(whitened(np.full(20, 2.0), filter_), 2.0 * 0.7)
+
+
+@pytest.mark.parametrize("order", [0, 1, 7])
+def test_a_few_samples_at_a_time_are_all_of_them(order):
+    values, coefficients = np.random.default_rng(6).standard_normal((200, 2)), np.arange(1.0, order + 2.0)
+    whole = whitened(values, coefficients)
+    assert np.array_equal(whitened(values, coefficients, at_a_time=16), whole)
+
+
+def test_a_long_record_is_filtered_without_copies_of_it():
+    values = np.ones((400_000, 4))
+    tracemalloc.start()
+    whitened(values, np.ones(8))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.5 * values.nbytes  # the result is one

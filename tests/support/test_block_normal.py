@@ -1,9 +1,13 @@
 """Normal equations of pieces against those of the whole matrix."""
 
+import tracemalloc
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from study.support.levenberg_marquardt import ContinuityGaps, point_at
+from study.support import levenberg_marquardt
+from study.support.levenberg_marquardt import ContinuityGaps, normal_equations, point_at
 
 
 def test_own_variables_are_eliminated_exactly() -> None:
@@ -34,3 +38,24 @@ def test_own_variables_are_eliminated_exactly() -> None:
         assert point.normal.decrement() == pytest.approx(fall, rel=1e-9)
         variance = np.sum(right**2) / ((48 if tied else 40) - len(x))
         np.testing.assert_allclose(point.covariance(), variance * np.linalg.inv(whole.T @ whole)[:k, :k], rtol=1e-7)
+
+
+@pytest.mark.parametrize("begins", [(0,), (0, 3, 40, 41, 120, 300), tuple(range(0, 500, 7))])
+def test_a_few_rows_at_a_time_are_all_of_them(begins: Sequence[int]) -> None:
+    random = np.random.default_rng(5)
+    jacobian, residual = random.standard_normal((500, 5)), random.standard_normal(500)
+    whole, parts = (levenberg_marquardt._products(jacobian, residual, begins, n) for n in (500, 64))  # pyright: ignore[reportPrivateUsage]
+    np.testing.assert_allclose(parts, whole, rtol=1e-13, atol=1e-13)
+    rows = np.column_stack([jacobian, residual])
+    for begin, end, own in zip(begins, (*begins[1:], 500), parts, strict=True):
+        np.testing.assert_allclose(own, rows[begin:end].T @ rows[begin:end], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("apart", [400_000, 50])
+def test_a_long_jacobian_is_not_copied(apart: int) -> None:
+    jacobian, residual = np.ones((400_000, 7)), np.ones(400_000)
+    tracemalloc.start()
+    normal_equations(residual, jacobian, 5, range(0, 400_000, apart))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < jacobian.nbytes

@@ -166,8 +166,8 @@ class JudgingRun:
         DivergenceError
             If the free run leaves the range of finite numbers.
         """
-        run = self._run((), finer, sensors=sensors)
-        return run.respond({}, self.initial)[0][self.prepared.plan.judge[0] - self.first :]
+        run, before = self._run((), finer, sensors=sensors), self.prepared.plan.judge[0] - self.first
+        return run.respond({}, self.initial)[0][before:].copy()  # the run along what was fitted is not kept
 
     def motion(self, name: str) -> Floats:
         """A motion of a single mass on the judging part, shape (samples to judge,)."""
