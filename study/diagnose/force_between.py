@@ -17,13 +17,11 @@ from study.diagnose.verdict import NOTHING, Diagnosis, diagnose, search_part
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
-from study.records.interpolation import READINGS
+from study.records.interpolation import BAND_LIMITED, READINGS, WORDS
 from study.records.prepared import Prepared
 from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError
 from study.support.numbers import percent
-
-WORDS = {"straight": "goes in straight lines from sample to sample", "held": "is held from each sample to the next"}
 
 
 def diagnose_as_read(
@@ -39,7 +37,8 @@ def diagnose_as_read(
     nothing may be missing with it: then the diagnosis is that of the record as it is read then, and its notes say so.
     """
     found = diagnose(comparison, extra=extra, without=without, progress=progress)
-    if found.verdict == NOTHING or comparison.fit.restarts or not comparison.fit.keys:
+    known = _sampled(comparison).record.between != BAND_LIMITED  # by what it does to the response
+    if known or found.verdict == NOTHING or comparison.fit.restarts or not comparison.fit.keys:
         return found
     best = min((row.response_error for row in found.candidates), default=comparison.prediction.error)
     for prepared in _better_read(comparison, min(best, comparison.prediction.error)):

@@ -14,7 +14,7 @@ from study.equations.model import Model
 from study.faults.correction import corrected, fault_columns, unit_of
 from study.faults.fault import ALL_SENSORS, DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault, Held
 from study.faults.force_noise import force_noise
-from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover
+from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover, refitted, share
 from study.faults.search import (
     FAR_APART,
     PLAIN,
@@ -35,6 +35,7 @@ from study.identify.time_domain.motion_start import delay_along_the_motion, has_
 from study.identify.time_domain.promised_changes import promised_changes
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
+from study.records.interpolation import BAND_LIMITED, WORDS
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
 from study.support.errors import StudyError
@@ -201,10 +202,41 @@ def _corrected(
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
         return _Corrected(fewer, end.faults, fit, prepared, put_off)
+    prepared, end = _read_as_held(prepared, end)
     final = corrected(prepared, end.faults)
     kept = needed(final)
     best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
     return _Corrected(kept, end.faults, best, prepared, put_off)
+
+
+def _read_as_held(prepared: Prepared, end: SearchEnd) -> tuple[Prepared, SearchEnd]:
+    """The record with its force held from each sample to the next, where that does what a delay was found to do.
+
+    A hold makes a force late by half a sample, and so all responses to it, by less than a sample whatever noise adds.
+    A delay stands where it leaves less by no chance, or one is seen beside the hold as well. Where the record cannot
+    tell, nothing is said against the sensors.
+    """
+    sensors = [str(sensor) for sensor in prepared.outputs.sensors]
+    everywhere = ALL_SENSORS if len(sensors) > 1 else sensors[0]
+    late = next(
+        (f for f in end.faults if f.fault == DELAY and f.channel == everywhere and f.corrected and not f.held), None
+    )
+    if late is None or not 0.0 < late.value < 1.0 or prepared.record.between != BAND_LIMITED:
+        return prepared, end
+    others = tuple(fault for fault in end.faults if fault is not late)
+    said = f"the force {WORDS['held']}: read as band-limited, the response would be late by {late.value:.3g} samples"
+    read = replace(
+        prepared, record=replace(prepared.record, between="held"), notes=(*prepared.notes, said),
+    )  # fmt: skip
+    before, now = leftover(end.rich, corrected(prepared, end.faults)), corrected(read, others)
+    fit, rich = (refitted(one, now) for one in (end.fit, end.rich))
+    after = None if rich is None else leftover(rich, now)
+    if before is None or fit is None or rich is None or after is None or leaves_less(after, before, 1):
+        return prepared, end
+    more = share(after, fault_columns(DELAY, everywhere, after), leading=True)
+    if more is not None and more.significant(1):
+        return prepared, end
+    return read, SearchEnd(others, fit, rich)
 
 
 def _beneath_too(

@@ -14,6 +14,7 @@ from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
 READINGS = (BAND_LIMITED, "straight", "held")
+WORDS = {"straight": "goes in straight lines from sample to sample", "held": "is held from each sample to the next"}
 
 
 def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
