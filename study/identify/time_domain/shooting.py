@@ -73,7 +73,8 @@ def needed_restarts(
         if begin in own:  # nothing from before reaches a motion that begins anew
             grown = nothing
         grown = through @ grown
-        sizes = np.append(np.linalg.norm(grown, 2, axis=(1, 2)) if len(grown) else (), size)
+        before: Floats = np.linalg.norm(grown, 2, axis=(1, 2)) if len(grown) else np.empty(0)
+        sizes: Floats = np.concatenate([before, [size]])
         grown = np.concatenate([grown, through[np.newaxis]])
         if np.max(sizes) > GROWTH and len(grown) > 1:
             kept.append(begin)
