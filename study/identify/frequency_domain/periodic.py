@@ -17,7 +17,7 @@ response with their correlation; standard errors come from the same scatter.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.fft import rfft
@@ -102,6 +102,9 @@ class Periods:
     keep: Ints
     force: Complexes
     powers: tuple[Complexes, ...]
+    known: dict[Chosen, Complexes] = field(
+        default_factory=dict[Chosen, Complexes]
+    )  # columns: halves share most of their averages
 
     @staticmethod
     def of(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> "Periods":
@@ -121,6 +124,11 @@ class Periods:
 
     def columns(self, chosen: Chosen) -> Complexes:
         """Lines of each shape of the average of some periods, times its parts' powers, (lines, parts)."""
+        if chosen not in self.known:
+            self.known[chosen] = self._computed(chosen)
+        return self.known[chosen]
+
+    def _computed(self, chosen: Chosen) -> Complexes:
         mean = {name: np.mean(values[list(chosen)], axis=0) for name, values in self.channels.items()}
         shapes = histories(self.inputs, replace(self.record, channels=mean))
         lines = [np.asarray(rfft(h), dtype=np.complex128)[self.keep] for h in shapes]

@@ -72,6 +72,8 @@ def needed_restarts(
     for begin, through, size in zip((span[0], *restarts[:-1]), weighted, alone, strict=True):
         if begin in own:  # nothing from before reaches a motion that begins anew
             grown = nothing
+        if not len(grown) and size <= 1.0:  # shrinks, and nothing from before is left to grow
+            continue
         grown = through @ grown
         before: Floats = np.linalg.norm(grown, 2, axis=(1, 2)) if len(grown) else np.empty(0)
         sizes: Floats = np.concatenate([before, [size]])
