@@ -58,12 +58,17 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.separation import limits_asked, rivals_of
     from study.equations import terms
     from study.equations.model_file import read_model
+    from study.records.record import MOTIONS, Sensor
+    from study.support.errors import expect
     from study.support.extras import undrawn
     from study.support.files import write_files
 
     folder, model = out_folder(arguments), read_model(arguments.model)
     for name in arguments.without:
         terms.get(name)
+    motions = [str(Sensor(coordinate, motion)) for coordinate in model.coordinates for motion in MOTIONS]
+    for name in arguments.sensor:  # at once, not once all is diagnosed
+        expect(name in motions, f"--sensor {name!r} is no motion of the model; expected one of {', '.join(motions)}")
     records = read_records(arguments, model)
     asked = arguments.max_force, arguments.max_displacement, arguments.max_length
     with progress(" steps", name=records[0].name) as step:

@@ -243,6 +243,10 @@ def test_the_command_writes_the_plan(trial, tmp_path, capsys):
     assert json.loads((tmp_path / "plan" / "plan.json").read_text())["limits"]["force"] == 3.0
     assert cli.main([*words, "--precision", "c=banana"]) == 2
     assert "is no value and width such as k3=5%" in capsys.readouterr().err
+    assert cli.main([*words, "--sensor", "roof displacement"]) == 2
+    told = capsys.readouterr().err
+    assert "'roof displacement' is no motion of the model; expected one of displacement, velocity, acceleration" in told
+    assert "diagnosing" not in told, "at once"
 
 
 def test_the_distance_that_is_needed_is_the_one_of_the_constants():
