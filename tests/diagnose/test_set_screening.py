@@ -1,5 +1,6 @@
 """Which sets of effects are worth a fit: what the search over columns finds is what trying every set finds."""
 
+from dataclasses import replace
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,13 @@ import pytest
 
 from study.diagnose import set_screening
 from study.diagnose.set_screening import best_subsets
+from study.equations.model import Model, free
+from study.equations.simulate import simulate
+from study.equations.terms import get
+from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.shape_search import baseline
+from study.records.prepared import prepare_record
+from study.records.record_layout import in_turns
 from study.support.arrays import Floats
 
 SIZES = (1, 2, 3, 4)
@@ -86,3 +94,20 @@ def test_a_narrow_beam_still_begins_with_the_best(monkeypatch: pytest.MonkeyPatc
     found = best_subsets(columns, target, (3,))[3]
     assert len(found) == 5
     assert found[0] == {"a", "d", "g"}
+
+
+def test_a_blow_whose_last_sample_begins_a_stretch_drives_no_line():
+    rng = np.random.default_rng(9)
+    terms = {"inertia": {"m": 1.0}, "linear_damping": {"c": 4.0}, "linear_stiffness": {"k": 355.0}}
+    model = Model("mass", tuple(free(get(name)) for name in terms))
+    values = {key: value for own in terms.values() for key, value in own.items()}
+    prepared = in_turns(prepare_record(simulate(model.with_values(values), rng.normal(size=8192), 0.02)))
+    fit = fit_part(model, prepared, (), values)
+    first, last = prepared.record.runs(prepared.inner(prepared.plan.fit))[2]
+    force = prepared.record["force"].copy()
+    force[first + 1 : last] = 0.0
+    silent = replace(prepared, record=prepared.record.with_channels({"force": force}))
+    columns, target = set_screening._spectra(fit.model, baseline(fit, silent))
+    whole = set_screening._spectra(fit.model, baseline(fit, prepared))[1]
+    assert 0 < len(target) < len(whole)
+    assert all(len(lines) == len(target) and np.all(np.isfinite(lines)) for lines in columns.values())
