@@ -94,7 +94,7 @@ def test_a_curve_is_one_input_of_the_reverse_system_however_short_the_record():
     warmth = 20.0 + 10.0 * np.sin(2.0 * np.pi * time / 11.0)
     terms = "{term: linear_stiffness, value: 355.0}", "{term: sched, force: u*(warmth-20)/10, value: -60.0}"
     found = fitted(recorded(terms, 1024, 0.01, 4, warmth=warmth), "{term: linear_stiffness, varies_with: warmth}")
-    assert [item.terms for item in found.force.inputs][1:] == [("linear_stiffness_over_warmth",)]
+    assert [item.terms for item in found.forces[0].inputs][1:] == [("linear_stiffness_over_warmth",)]
     assert len(found.fit.model.terms[-1].symbols) == 9
     assert found.prediction.error < 1.2 * found.prediction.floor
 
