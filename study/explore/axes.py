@@ -45,9 +45,11 @@ def force_limits(comparison: Comparison) -> tuple[float, float]:
     least, most = math.inf, 0.0
     for force in comparison.forces:
         keep = heard(comparison, force.frequency)
-        least = min(least, *(float(np.min(s[keep])) for s in (force.parametric, force.unexplained, force.noise)))
-        most = max(most, *(float(np.max(s[force.band])) for s in (force.parametric, force.unexplained)))
-    return 50.0 * max(least, 1e-9), max(200.0, 150.0 * most)
+        shares = force.parametric, force.unexplained, force.noise
+        least = min(least, *(float(np.min(s[keep], initial=math.inf)) for s in shares))
+        most = max(most, *(float(np.max(s[force.band], initial=0.0)) for s in shares[:2]))
+    low = 50.0 * max(least, 1e-9) if math.isfinite(least) else 1.0  # a short record may have no line in the panel
+    return low, max(200.0, 150.0 * most)
 
 
 def sensor_axes(focus: Focus, columns: Mapping[str, Columns]) -> list[Row]:
