@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from study.compare.prediction import SensorPrediction
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 STRETCHES = 6
 BLOCKS = 48  # at most
 APART = 6.0  # correlation times in a block, at least: then neighbours are nearly independent

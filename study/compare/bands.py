@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.compare.force_error import ForceError
 from study.compare.prediction import SensorPrediction
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named
 CLEAR = 2.0  # standard errors above the noise, for a line to count
 

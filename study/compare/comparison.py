@@ -21,9 +21,10 @@ from study.compare.prediction import Prediction, SensorPrediction, predict
 from study.compare.unlike_records import unlike_in_words, unlike_records
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.equations.equations_of_motion import loose_motions
-from study.equations.linear_part import LINEAR, Modes, modes_of
+from study.equations.linear_part import Modes, modes_of
 from study.equations.model import Model
 from study.equations.place import Place
+from study.equations.terms import LINEAR
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model

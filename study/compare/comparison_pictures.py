@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from study.compare import panels
 from study.compare.comparison import Comparison
@@ -22,9 +21,6 @@ from study.figures.curves import InputCoherence
 from study.figures.styles import in_style
 from study.records.prepared import FORCE
 from study.support.numbers import percent
-
-Floats = NDArray[np.float64]
-WIDE = 7.2  # inches
 
 
 def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
@@ -65,7 +61,7 @@ def response_figure(comparison: Comparison) -> Figure:
     about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(comparison.prediction.floor)}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: {comparison.plan.response}", f"model {comparison.model.name}; {about}",
-        rows=3, width=WIDE, panel=1.8, legend_rows=2, share=False,
+        rows=3, width=page.WIDE, panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
     panels.response_panel(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
     panels.residual(axes[1], prediction.time, prediction.residual, prediction.noise.rms, unit)
@@ -87,7 +83,7 @@ def force_error_figure(comparison: Comparison) -> Figure:
     columns = min(len(forces), 2)
     figure, axes = page.empty_page(
         f"{comparison.record.name}: error of the force", f"model {comparison.model.name}; unexplained is {about}",
-        rows=2 * len(forces) // columns, columns=columns, width=WIDE if columns == 1 else page.width(columns),
+        rows=2 * len(forces) // columns, columns=columns, width=page.WIDE if columns == 1 else page.width(columns),
         panel=2.3, legend_rows=2, share=False,
     )  # fmt: skip
     titles = list[str]()
@@ -120,7 +116,7 @@ def missing_force_figure(comparison: Comparison) -> Figure:
         about = f"{place_in_words(comparison.place)}, {about}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: the force that the model lacks", f"model {comparison.model.name}; {about}", rows=3,
-        width=WIDE, panel=2.3, share=False,
+        width=page.WIDE, panel=2.3, share=False,
     )  # fmt: skip
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     panels.missing_force_panel(axes[0], surface(u, v, force), unit)
@@ -138,7 +134,7 @@ def error_in_time_figure(comparison: Comparison) -> Figure:
         chance = f"{comparison.worst.sensor}; {chance}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: error along the record", f"model {comparison.model.name}; {chance}",
-        rows=2, width=WIDE, panel=2.0, share=False,
+        rows=2, width=page.WIDE, panel=2.0, share=False,
     )  # fmt: skip
     panels.error_in_time(axes[0], comparison.time, comparison.worst.noise.rms / comparison.worst.size)
     panels.error_beyond_level(axes[1], comparison.time)
@@ -152,7 +148,7 @@ def by_level(moving: Sequence[Level], force_unit: str) -> Figure:
     columns = 2 if len(moving) > 1 else 1
     figure, axes = page.empty_page(
         "Coefficients by level of excitation", "with 95 % intervals; the right model's do not move",
-        rows=-(-len(moving) // columns), columns=columns, width=1.25 * WIDE, panel=1.9, legend_rows=0, share=False,
+        rows=-(-len(moving) // columns), columns=columns, width=1.25 * page.WIDE, panel=1.9, legend_rows=0, share=False,
     )  # fmt: skip
     figure.subplots_adjust(wspace=0.38)
     for panel, level in zip(axes, moving, strict=False):

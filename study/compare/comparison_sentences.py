@@ -11,6 +11,7 @@ from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.compare.varying_coefficients import varying_in_words
 from study.equations.place import place_in_words
+from study.equations.terms import LINEAR
 from study.records.record import FORCE
 from study.support.numbers import by_chance, percent
 
@@ -20,7 +21,6 @@ TOLD_APART = 2.0  # standard errors by which the best way must explain more than
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
 SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
 HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
-LEAST = ("inertia", "linear_damping", "linear_stiffness")
 NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
@@ -43,7 +43,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
 def _least(comparison: Comparison) -> str:
     """What to look for when a model predicts nothing."""
     known = {entry.term.name for entry in comparison.model.terms}
-    lacking = [name.replace("_", " ") for name in LEAST if name not in known]
+    lacking = [name.replace("_", " ") for name in LINEAR if name not in known]
     if lacking:
         return f"mass, damping and stiffness are the least that a model needs; it lacks {' and '.join(lacking)}"
     held = ", ".join(comparison.model.held_keys)

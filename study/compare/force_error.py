@@ -34,9 +34,9 @@ from study.records.plan import FEWEST
 from study.records.prepared import FORCE
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra, cross_spectra_within
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
 FEWEST_AVERAGES = 4  # for each input
 AUDIBLE = 1e-6  # of its largest density: the force has no power on lines below
 HEARD = 1e-4  # of its largest density

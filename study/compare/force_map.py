@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
+
 CELLS = (21, 15, 11, 7)  # along each axis of the map, from the finest
 CLASSES = 24  # of a curve
 FEWEST = 8  # visits, for a mean with an error

@@ -10,11 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.compare.missing_force import MissingForce
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 POWERS = np.arange(0.0, 6.01, 0.25)
 BLOCKS = 24
 VISIBLE = 1e-3  # of a shape must be left beside the fitted terms, for it to be tried

@@ -16,15 +16,13 @@ from study.equations import dimensions
 from study.figures import page
 from study.records.record import FORCE, MOTIONS, Sensor
 
-WIDE = 7.2  # inches
-
 
 def decay_figure(comparison: Comparison, decays: Mapping[str, Decays]) -> Figure:
     """Frequency and damping ratio against amplitude, measured and of the fitted model; a column for each sensor."""
     count = len(decays)
     figure, axes = page.empty_page(
         f"{comparison.record.name}: free decay", f"model {comparison.model.name}; windows of the analytic signal",
-        rows=2, columns=count, width=WIDE if count == 1 else page.width(count), panel=2.2, share=count == 1,
+        rows=2, columns=count, width=page.WIDE if count == 1 else page.width(count), panel=2.2, share=count == 1,
     )  # fmt: skip
     for column, (sensor, found) in enumerate(decays.items()):
         both = axes[column], axes[count + column]
@@ -54,7 +52,7 @@ def loops_figure(comparison: Comparison) -> Figure:
     record, sensors, titles = comparison.record, comparison.prediction.views, list[str]()
     figure, axes = page.empty_page(
         f"{record.name}: loops", f"model {comparison.model.name}; the judging part",
-        rows=len(sensors), columns=3, width=1.45 * WIDE, panel=2.9, share=False,
+        rows=len(sensors), columns=3, width=1.45 * page.WIDE, panel=2.9, share=False,
     )  # fmt: skip
     for number, seen in enumerate(sensors):
         own, found = axes[3 * number : 3 * number + 3], loops(comparison, number)

@@ -15,9 +15,9 @@ from study.compare.force_map import CLASSES, cells_of, edges
 from study.compare.missing_force import MissingForce
 from study.compare.prediction import Prediction, SensorPrediction
 from study.records.spectra import Segments
+from study.support.arrays import Floats
 from study.support.statistics import IN_A_BLOCK
 
-Floats = NDArray[np.float64]
 BLOCKS = 64  # at most
 
 

@@ -24,10 +24,9 @@ from study.identify.frequency_domain.local_polynomial import (
     transform,
     transients,
 )
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 DEGREE = 2
 
 

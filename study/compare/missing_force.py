@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.compare.force_map import ForceCurve, curve
@@ -41,11 +40,10 @@ from study.records.noise_floor import CLEAR, SMOOTH
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments
-from study.support.arrays import Complexes, Floats
+from study.support.arrays import Bools, Complexes, Floats
 from study.support.errors import DivergenceError
 
 LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

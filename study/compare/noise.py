@@ -8,14 +8,13 @@ the level of the quietest bands of the residual (``noise_floor``).
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records import noise_floor
 from study.records.prepared import Prepared
 from study.records.record import Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 

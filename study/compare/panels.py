@@ -18,8 +18,8 @@ from study.compare.force_error import ForceError
 from study.compare.force_map import ForceCurve, Surface
 from study.equations import dimensions
 from study.figures import labels
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
 MEASURED: dict[str, Any] = {"color": "0.62", "label": "measured"}
 PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}

@@ -18,7 +18,6 @@ from study.figures.sketch import Sketch
 from study.figures.sketch_drawing import structure_sketch
 from study.support.numbers import percent
 
-WIDE = 7.2  # inches
 MAPS, SENSORS, MODES = 9, 6, 6  # panels on one page at most: the first connections, the worst sensors, slowest modes
 
 
@@ -36,7 +35,7 @@ def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
     """The sketch on a page."""
     places = [link for link in drawn.links if link.share > 0.0]
     most = max(places, key=lambda link: link.share, default=None)
-    about, width = "nothing that is left depends on the motion anywhere", max(WIDE, drawn.width)
+    about, width = "nothing that is left depends on the motion anywhere", max(page.WIDE, drawn.width)
     if most is not None:
         about = f"brightest: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
     figure, (axes,) = page.empty_page(
@@ -76,7 +75,7 @@ def responses_figure(comparison: Comparison) -> Figure:
     figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: {'forces' if comparison.model.prescribed else 'motions'}",
         f"model {comparison.model.name}; close-up where it fails most",
-        rows=len(order), width=WIDE, panel=1.5, share=False,
+        rows=len(order), width=page.WIDE, panel=1.5, share=False,
     )  # fmt: skip
     time = prediction.prepared.record.time[slice(*prediction.prepared.plan.judge)]
     names: list[str] = []
@@ -99,7 +98,7 @@ def shared_force_figure(comparison: Comparison) -> Figure:
     figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: shared residual force",
         "off the diagonal it acts between two coordinates, on it from outside or the ground",
-        panel=max(1.8, 0.5 * count), width=max(WIDE, 2.6 + 0.8 * count), legend_rows=0, headed=False,
+        panel=max(1.8, 0.5 * count), width=max(page.WIDE, 2.6 + 0.8 * count), legend_rows=0, headed=False,
     )  # fmt: skip
     figure.subplots_adjust(left=0.2, right=0.8)
     place_panels.shared_force(axes, comparison.missing)

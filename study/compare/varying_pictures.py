@@ -36,7 +36,7 @@ def varying_figure(found: Sequence[VaryingCoefficient], record: str) -> Figure:
     """All coefficients that vary, one below the other."""
     figure, axes = page.empty_page(
         f"{record}: coefficients that vary", "with bands of 95 %, over what the record covers", rows=len(found),
-        width=7.2, panel=2.3, share=False,
+        width=page.WIDE, panel=2.3, share=False,
     )  # fmt: skip
     for panel, one in zip(axes, found, strict=True):
         varying_panel(panel, one)

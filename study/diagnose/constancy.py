@@ -16,11 +16,10 @@ from scipy.special import chdtrc
 
 from study.equations.model import ModelTerm
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.support.arrays import Complexes, Floats
 from study.support.least_squares import length_or_one
 from study.support.thresholds import ALPHA, TOLERANCE
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 INDISTINCT = 1e-6
 BANDS = 8
 CLASSES = 4

@@ -22,12 +22,12 @@ from typing import cast
 from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE, GROUND, HERE, Kind, Place
 from study.equations.redundancy import repeated_force
+from study.equations.terms import LINEAR
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 KEYS = ("coordinates", "forces", "linear")
 MODAL, ALIAS = "modal", "measured"
-LINEAR = ("inertia", "linear_stiffness", "linear_damping")
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
 MOST = 40  # coordinates
 Forces = tuple[tuple[str, str], ...]

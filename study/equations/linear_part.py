@@ -15,11 +15,10 @@ from scipy.fft import rfftfreq
 from study.equations.equations_of_motion import mass_entries
 from study.equations.model import Model
 from study.equations.place import GROUND, HERE, Place
+from study.equations.terms import LINEAR
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
-
-LINEAR = {"linear_stiffness": 0, "linear_damping": 1, "inertia": 2}  # and the order of their derivative
 
 
 def linear_keys(model: Model) -> dict[str, int]:

@@ -257,6 +257,8 @@ _TERMS = (
 )  # fmt: skip
 
 LIBRARY: dict[str, Term] = {term.name: term for term in _TERMS}
+# What makes a linear model, each with the order of its derivative.
+LINEAR = {t.name: t.components[0].order for t in _TERMS if [c.shape for c in t.components] == ["u"]}
 
 
 def get(name: str) -> Term:

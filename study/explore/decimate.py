@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
+
 BUCKETS = 1200  # about one for each column of pixels
 
 

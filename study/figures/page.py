@@ -23,7 +23,7 @@ from study.support.errors import StudyError
 from study.support.files import replace_file
 
 LEFT, BOTTOM, TITLE, GAP = 0.88, 0.55, 0.58, 0.34  # inches
-WIDTH = 6.4
+WIDTH, WIDE = 6.4, 7.2  # inches
 TEXT_TO_PATH = TextToPath()
 METADATA = {
     "svg": {"Date": None},

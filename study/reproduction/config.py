@@ -14,9 +14,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from study.equations import terms
-from study.equations.layout import LINEAR
 from study.equations.model import Model, free, named_channels
 from study.equations.model_file import read_model
+from study.equations.terms import LINEAR
 from study.identify.estimators import ESTIMATORS
 from study.identify.estimators.base import true_parameters
 from study.identify.frequency_domain import reverse_system

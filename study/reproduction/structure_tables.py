@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from study.compare.comparison import Comparison
-from study.equations.layout import LINEAR
 from study.equations.linear_part import modes_of, transfer
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model
+from study.equations.terms import LINEAR
 from study.identify.frequency_domain.action_reaction import JointEstimate, joint_estimate
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input

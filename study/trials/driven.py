@@ -14,13 +14,13 @@ import numpy as np
 from study.equations.free_run import predict_response
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
-from study.equations.terms import get
+from study.equations.terms import LINEAR, get
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.trials import effects
-from study.trials.effects import LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_oscillator, share_of
+from study.trials.effects import SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_oscillator, share_of
 
 EXCITATIONS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
 KNOWN_EFFECTS = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import ShapeParameter, Term
-from study.equations.terms import LIBRARY, get
+from study.equations.terms import LIBRARY, LINEAR, get
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.records.record import MOTIONS, Record
@@ -21,7 +21,6 @@ from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA
 from study.way_in.compare_records import made_ready
 
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 # Effects that the library has got since: hidden in trials like real rigs, and in no trial that was published before.
 LATER = (
     "stribeck_friction", "load_dependent_friction", "directional_damping", "directional_quadratic_damping",

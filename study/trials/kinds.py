@@ -16,13 +16,13 @@ import numpy as np
 from study.equations.free_run import predict_response
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import Term
-from study.equations.terms import get
+from study.equations.terms import LINEAR, get
 from study.records.excitation import displacement_noise
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.support.arrays import Floats
 from study.support.errors import expect
 from study.trials import effects
-from study.trials.effects import HIDDEN, LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_model
+from study.trials.effects import HIDDEN, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_model
 
 TIMED = ("periodic_stiffness", "harmonic_force")  # what knows of time: no program of a test is in step with it
 TEST_STEPS = 8  # of the integration, a sample

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.model import Model
 from study.equations.place import HERE, Place
@@ -24,9 +23,8 @@ from study.records import spectra
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, segment_length
-from study.support.arrays import Complexes, Floats
+from study.support.arrays import Bools, Complexes, Floats
 
-Bools = NDArray[np.bool_]
 FAINT = 1e-3  # of the strongest line's force
 
 

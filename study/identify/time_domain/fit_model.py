@@ -11,12 +11,11 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.equations_of_motion import loose_motions
 from study.equations.model import Model, ModelTerm
 from study.equations.redundancy import repeated_along
-from study.equations.terms import LIBRARY
+from study.equations.terms import LIBRARY, LINEAR
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.start_of_changes import start_of_changes
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
@@ -25,7 +24,6 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.no_response import (
-    LINEAR,
     SURE,
     driven_at,
     explains_nothing,
@@ -47,9 +45,9 @@ from study.identify.time_domain.told_alone import (
 )
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
 
-Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
 BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at

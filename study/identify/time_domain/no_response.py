@@ -5,6 +5,7 @@ from scipy.fft import rfft, rfftfreq
 from scipy.special import fdtrc
 
 from study.equations.model import Model
+from study.equations.terms import LINEAR
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import FORCE, Prepared
@@ -14,7 +15,6 @@ from study.support.thresholds import ALPHA
 
 SURE = 3.0  # standard errors by which a coefficient must differ from zero to have a sign
 ORDER = ("m", "c", "k")
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")
 
 
 def why_no_response(model: Model, prepared: Prepared) -> str:

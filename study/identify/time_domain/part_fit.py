@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, needed_steps, prepare
 from study.equations.model import Model
@@ -13,12 +12,12 @@ from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.stretch_states import states_along, states_of_segments
 from study.records.prepared import Prepared
 from study.records.record import ALONE, Sensor
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
 from study.support.statistics import clustered_covariance
 
-Floats = NDArray[np.float64]
 FAR = 1e150  # a shift beyond all measure
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import rfftfreq
 
-from study.equations.linear_part import LINEAR, linear_keys, patterns
+from study.equations.linear_part import linear_keys, patterns
 from study.equations.model import ModelTerm
 from study.equations.place import Place
+from study.equations.terms import LINEAR
 from study.identify.frequency_domain.inputs import input_history, placed_inputs, relative_record
 from study.identify.time_domain.part_fit import linearise
 from study.records.completion import derivative

@@ -11,12 +11,11 @@ import numpy as np
 
 from study.equations.model import Model, ModelTerm
 from study.equations.place import GROUND, HERE, Place
+from study.equations.terms import LINEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.outputs import Outputs
 from study.records.prepared import Prepared
 from study.records.record import ALONE, FORCE, MOTIONS, Record, Sensor
-
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # the same whichever way round
 
 
 def is_alone(model: Model) -> bool:

@@ -18,10 +18,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from study.equations.formulas import ExpressionError
-from study.equations.layout import LINEAR
 from study.equations.model import Model
 from study.equations.model_file import parse_model, read_model
 from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LINEAR
 from study.figures import page
 from study.identify.estimators.base import Settings, true_parameters
 from study.identify.estimators.in_free_run import free_run_fit, miso_free_shape

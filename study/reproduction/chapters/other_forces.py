@@ -16,10 +16,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from study.equations.layout import LINEAR
 from study.equations.model import Model, free
 from study.equations.model_file import read_model
-from study.equations.terms import get
+from study.equations.terms import LINEAR, get
 from study.figures import page
 from study.figures.labels import term_names
 from study.identify.estimators.base import Settings
