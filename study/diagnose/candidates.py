@@ -169,6 +169,15 @@ def elsewhere(tried: Sequence[FittedCandidate], ordered: Sequence[Screened]) -> 
     ]  # fmt: skip
 
 
+def those_not_tried(
+    entries: Sequence[ModelTerm], tried: Sequence[FittedCandidate], base: Baseline, progress: Progress | None = None
+) -> list[FittedCandidate]:
+    """Fit and judge every candidate that promised too little; of two sides of a place the better stays."""
+    done = {(c.term.name, c.entry.place.path) for c in tried}
+    left = [item for item in screened(entries, base) if (item.entry.term.name, item.entry.place.path) not in done]
+    return _one_side(_fitted(left, base, progress, len(tried)))
+
+
 def _worse(candidate: FittedCandidate) -> tuple[bool, float]:
     return bool(candidate.unphysical), candidate.prediction.error
 

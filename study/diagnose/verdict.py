@@ -26,7 +26,7 @@ from study.equations.terms import Term
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.motion_start import has_lost_the_motion
+from study.identify.time_domain.motion_start import has_lost_the_motion, seen_everywhere
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
 from study.identify.time_domain.promised_changes import PromisedChanges, promised_changes
 from study.identify.time_domain.shape_search import Baseline
@@ -131,6 +131,10 @@ def diagnose(
     if (freed := _freed(comparison, base, tried)) is not None:
         return diagnose(freed, extra=extra, without=without, progress=progress)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
+    more = _where_none_explains_it(found, base, tried, entries, progress)
+    if more:
+        tried = [*tried, *more]
+        found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
     if elsewhere or found.verdict == NOTHING or not (named := [*found.sets, *found.candidates][:1]):
         return found
     if named[0].prediction.above_noise <= TOLERANCE:
@@ -141,6 +145,23 @@ def diagnose(
         return found
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     return found if other is None or not other.changes else other
+
+
+def _where_none_explains_it(
+    found: Diagnosis, base: Baseline, tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm],
+    progress: Progress | None,
+) -> list[FittedCandidate]:  # fmt: skip
+    """The candidates that promised too little, fitted, if one of them leaves less than what was found; else none.
+
+    What sensors see elsewhere promises little of an effect where none is.
+    """
+    best, comparison = next(iter([*found.sets, *found.candidates]), None), found.comparison
+    lumped = base.several and comparison.model.modal is None
+    unseen = lumped and not seen_everywhere(comparison.model, comparison.prepared)
+    if best is None or not (unseen and _leaves_much(best.prediction)):
+        return []
+    more = candidates.those_not_tried(entries, tried, base, progress)
+    return more if any(c.prediction.error < best.prediction.error and not c.unphysical for c in more) else []
 
 
 def _changing(

@@ -2,19 +2,21 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from study.cli import main
 from study.compare.comparison import compare
-from study.diagnose.candidates import screened
-from study.diagnose.verdict import search_base
+from study.diagnose.candidates import screened, try_all
+from study.diagnose.verdict import diagnose, search_base
 from study.equations.model_file import format_model, read_model
 from study.equations.possible_effects import candidate_entries
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import external, get, one_sided
 from study.records.prepared import prepare_record
-from study.records.record import write_csv
+from study.records.record import Sensor, write_csv
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +118,44 @@ def test_candidates_are_effects_times_places(believed):
     assert [one_sided(get(n)) for n in ("cubic_stiffness", "quadratic_stiffness", "bilinear_stiffness")] == [
         False, False, True,
     ]  # fmt: skip
+
+
+TWO_MASSES = """
+name: two masses
+coordinates: [mass1, mass2]
+forces: {shaker: mass2}
+terms:
+  - {term: inertia, at: mass1, value: 1.0}
+  - {term: inertia, at: mass2, value: 1.0}
+  - {term: linear_stiffness, between: [ground, mass1], value: 400.0}
+  - {term: linear_damping, between: [ground, mass1], value: 1.0}
+  - {term: linear_stiffness, between: [mass1, mass2], value: 400.0}
+  - {term: linear_damping, between: [mass1, mass2], value: 1.0}
+  - {term: cubic_stiffness, between: [ground, mass1], value: 1200.0}
+"""
+
+
+@pytest.mark.long
+def test_an_effect_that_promises_little_is_tried_where_all_others_leave_much(tmp_path: Path) -> None:
+    # The linear model loses the motion of a hard spring far from the only sensor, and what is left points elsewhere.
+    (tmp_path / "true.yaml").write_text(TWO_MASSES)
+    true = read_model(tmp_path / "true.yaml")
+    rng = np.random.default_rng(3)
+    frequencies = np.fft.rfftfreq(4096, 0.02)
+    driven = (frequencies > 0.5) & (frequencies < 8.0)
+    lines = np.zeros(len(frequencies), dtype=complex)
+    lines[driven] = np.exp(2j * np.pi * rng.random(np.sum(driven)))
+    drive = np.fft.irfft(lines)
+    drive *= 20.0 / np.std(drive)
+    record = simulate(true, {"shaker": drive}, 0.02, Integrator("rk4", 8), sensors=[Sensor("mass2", "displacement")])
+    moved = record["mass2 displacement"]
+    noisy = moved + 0.03 * np.std(moved) * rng.standard_normal(len(moved))
+    record = record.with_channels({"mass2 displacement": noisy})
+    lacking = true.without_term("cubic_stiffness[ground-mass1]")
+    comparison = compare(lacking.with_values(dict.fromkeys(lacking.values, None)), prepare_record(record))
+    tried = try_all(candidate_entries(comparison.fit.model), search_base(comparison))
+    assert "cubic_stiffness[ground-mass1]" not in [c.name for c in tried]
+    found = diagnose(comparison)
+    assert found.verdict == "missing_effect"
+    assert found.candidates[0].name == "cubic_stiffness[ground-mass1]"
+    assert found.candidates[0].prediction.error < 0.035 < 0.5 < comparison.prediction.error
