@@ -29,6 +29,7 @@ RIVAL_LOOKS: tuple[dict[str, Any], ...] = (
     {"linestyle": (0, (6, 1, 1, 1, 1, 1)), "color": "0.3", "linewidth": 1.3},
     {"linestyle": (0, (1, 3)), "color": "C5", "linewidth": 2.4},
 )  # fmt: skip
+PAGE_WIDTH = 7.8  # inches
 
 
 def next_test_pictures(found: NextTest) -> dict[str, bytes]:
@@ -40,20 +41,20 @@ def next_test_pictures(found: NextTest) -> dict[str, bytes]:
 def next_test_figure(found: NextTest) -> Figure:
     """What drives the test, what each rival answers where they differ most, and what no coefficient makes up for."""
     words = design_in_words(found.choice.design, found.rivals.present)
-    first = rival_in_words(found.rivals.rows[0], found.rivals.rows)
     panels = {
         "what drives it": driving_panel, "what each would answer, where they differ most": answers_panel,
-        f"evidence against each other if {first} is true": evidence_panel,
+        "evidence against each of the others, if the first is true": evidence_panel,
     }  # fmt: skip
     drawn = list(panels.items())[1 if found.choice.design.kind == LET_GO else 0 :]
+    columns = page.legend_columns([rival_in_words(row, found.rivals.rows) for row in found.rivals.rows], PAGE_WIDTH)
     figure, axes = page.empty_page(
         f"Which test next? {found.rivals.prepared.record.name}", words, rows=len(drawn), panel=1.7,
-        legend_rows=-(-len(found.rivals.rows) // 3), share=False, width=7.8,
+        legend_rows=-(-len(found.rivals.rows) // columns), share=False, width=PAGE_WIDTH,
     )  # fmt: skip
     for own, (_, draw) in zip(axes, drawn, strict=True):
         draw(own, found)
     page.letter(axes, [name for name, _ in drawn])
-    page.shared_legend(figure, axes[-2:-1], 3)
+    page.shared_legend(figure, axes[-2:-1], columns)
     return figure
 
 

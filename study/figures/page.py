@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
+from matplotlib import rcParams
 from matplotlib import style as styles
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -80,6 +81,13 @@ def text_width(text: str, font: FontProperties) -> float:
 def rows_for(entries: int) -> int:
     """Rows of a legend of so many entries: four fit in one row, of more there are three in each."""
     return 1 if entries <= 4 else -(-entries // 3)
+
+
+def legend_columns(labels: Sequence[str], width: float, most: int = 3) -> int:
+    """How many labels stand side by side in the legend of a page of so many inches."""
+    font = FontProperties(size=rcParams["legend.fontsize"])
+    widest = max(text_width(label, font) for label in labels) + 0.6  # its line, and the gap to the next
+    return max(1, min(most, int((width - LEFT) / widest)))
 
 
 def shared_legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
