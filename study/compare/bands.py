@@ -10,7 +10,7 @@ from study.compare.prediction import SensorPrediction
 from study.support.arrays import Floats
 
 MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named
-CLEAR = 2.0  # standard errors above the noise, for a line to count
+STANDS_OUT = 2.0  # standard errors above the noise, for a line to count
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def bands(views: Sequence[SensorPrediction], forces: Sequence[ForceError]) -> tu
 def _response(view: SensorPrediction) -> Floats:
     """Density of the response that stands above the noise, shape (lines,)."""
     noise = view.noise
-    spread = CLEAR / np.sqrt(noise.averages)
+    spread = STANDS_OUT / np.sqrt(noise.averages)
     response = np.where(noise.residual > noise.density * (1.0 + spread), noise.residual - noise.density, 0.0)
     response[noise.frequency < view.prepared.low] = 0.0
     return response

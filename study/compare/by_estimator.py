@@ -15,7 +15,7 @@ from study.equations.model import Model
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.coefficients import Estimate
-from study.identify.frequency_domain.starting_values import FAINT
+from study.identify.frequency_domain.linear_start import FAINT
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone, told_back

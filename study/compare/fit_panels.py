@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from study.compare.panels import DOTTED
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations import dimensions
 
 MEASURED: dict[str, Any] = {"color": "0.55", "linewidth": 2.4, "label": "measured"}
 MODEL: dict[str, Any] = {"color": "C0", "linewidth": 1.3, "label": "model"}
-BAND: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
 
 
 def response_magnitude(axes: Axes, functions: ResponseFunctions, unit: str, highest: float) -> Axes:
@@ -74,7 +74,7 @@ def with_force(axes: Axes, checks: ResidualChecks) -> Axes:
 
 def _banded(axes: Axes, band: float, label: str) -> Axes:
     for side in (-band, band):
-        axes.axhline(side, label="99 % band" if side > 0.0 else None, **BAND)
+        axes.axhline(side, label="99 % band" if side > 0.0 else None, **DOTTED)
     axes.set_xlabel("lag (s)")
     axes.set_ylabel(label)
     return axes

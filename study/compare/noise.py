@@ -16,7 +16,7 @@ from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
-WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
+WHITE, SCATTER, INTEGRATION = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def noise_of(
     if scatter is not None:
         noise = _with_density(noise, autospectrum(scatter, dt, cut)[1], low, len(difference), len(scatter))
     if noise.rms < numerical:
-        noise = replace(noise, rms=numerical, source=EXACT)
+        noise = replace(noise, rms=numerical, source=INTEGRATION)
     # Noise is a part of what is left: an estimate of it that scatters above all of that is cut back to it.
     return replace(noise, rms=min(noise.rms, float(np.sqrt(np.mean(residual**2)))))
 

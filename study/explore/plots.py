@@ -61,7 +61,7 @@ def close(s: Sources) -> Any:
 
 def _blocks(drawn: Any, s: Sources) -> None:
     """The stretches of time in which a selected band or amplitude is at home."""
-    strips = VStrip(x0="left", x1="right", fill_color=theme.BAND, fill_alpha="weight", line_color=None)
+    strips = VStrip(x0="left", x1="right", fill_color=theme.AMBER, fill_alpha="weight", line_color=None)
     drawn.add_glyph(s["blocks"], strips, level="underlay", nonselection_glyph=None)
 
 

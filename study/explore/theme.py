@@ -27,7 +27,7 @@ NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash"
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
 PINNED: dict[str, Any] = {"line_color": "#1b6e3c", "line_width": 1.7, "line_dash": [7, 3]}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
-BAND = "#f5c04a"
+AMBER = "#f5c04a"
 POWERS = """
 const power = Math.floor(Math.log10(tick) + 1e-9), mantissa = Number((tick / 10 ** power).toPrecision(2))
 if (power >= -2 && power <= 3) return String(Number(tick.toPrecision(3)))
@@ -126,7 +126,7 @@ def _item(label: Any, renderers: list[Any], panel: str) -> LegendItem:
 def chosen(drawn: Any, name: str) -> BoxAnnotation:
     """The range that was selected in a panel, hidden until there is one."""
     box = BoxAnnotation(
-        name=name, visible=False, fill_color=BAND, fill_alpha=0.35, line_color="#8a6d00", line_dash="dashed",
+        name=name, visible=False, fill_color=AMBER, fill_alpha=0.35, line_color="#8a6d00", line_dash="dashed",
         line_width=1.0, level="underlay", propagate_hover=True,
     )  # fmt: skip
     drawn.add_layout(box)

@@ -18,7 +18,7 @@ from study.support.arrays import Bools, Floats
 
 FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
 STIRRED = 0.05  # samples by which a force is moved to see what a delay of it does
-BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
+ALSO_LOST = 2  # samples on either side of lost ones that a channel which is moved in time loses too
 
 
 def unit_of(fault: str, response_unit: str) -> str:
@@ -126,7 +126,7 @@ def _without_faults(faults: Sequence[Fault], values: Floats, dt: float) -> tuple
                     values = values - fault.waveform
     late = sum(abs(fault.value) for fault in faults if fault.fault == DELAY)
     if late and np.any(lost):
-        lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + BESIDE) + 1), "same") > 0.5
+        lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + ALSO_LOST) + 1), "same") > 0.5
     return values, lost
 
 

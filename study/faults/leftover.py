@@ -33,7 +33,7 @@ Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shape
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
 SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
 FITTED = 5  # effects of the largest linear share that are fitted
-CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
+AS_GOOD = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
 
@@ -380,7 +380,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     for group in ([t for t in tried if not unphysical(t, left)], tried):
         if group:  # of those that chance may make worse than the best, the one with the fewest unknowns
             best = min(group, key=lambda t: float(np.sum(t.residual[1] ** 2)))
-            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
+            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < AS_GOOD]
             simplest = min(level, key=lambda t: (len(t.fit.keys), t is not best))
             if leaves_less(left, simplest, len(entries)):
                 return simplest

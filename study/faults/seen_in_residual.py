@@ -23,7 +23,7 @@ SLOWEST, NEXT = 8, 32  # cosines, of half a period each more than the one before
 FEWEST = 256  # samples that show both
 HARMONICS = tuple(sorted(n * mains for n in range(1, 7) for mains in (50.0, 60.0)))  # of the mains, in hertz
 WANDER = 1e-3  # share by which the mains' frequency wanders
-BESIDE = 24  # lines on either side that a line is held against
+LINES_BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 DRIFTING = 12  # lines from zero that are drift, not hum
 NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
@@ -151,10 +151,10 @@ def _strongest_line(left: SensorResidual, level: float) -> float | None:
     residual = left.both
     n = len(residual)
     power = np.abs(np.asarray(rfft(residual * np.hanning(n)))) ** 2
-    if len(power) < 4 * BESIDE:
+    if len(power) < 4 * LINES_BESIDE:
         return None
-    kernel = np.ones(2 * BESIDE + 1)
-    kernel[BESIDE - NEAREST : BESIDE + NEAREST + 1] = 0.0
+    kernel = np.ones(2 * LINES_BESIDE + 1)
+    kernel[LINES_BESIDE - NEAREST : LINES_BESIDE + NEAREST + 1] = 0.0
     count = np.convolve(np.ones_like(power), kernel, "same")
     level_beside = np.convolve(power, kernel, "same") / count
     ratio = power / np.maximum(level_beside, np.finfo(float).tiny)

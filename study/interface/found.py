@@ -15,7 +15,7 @@ from study.diagnose.user_candidates import check_on, own_candidates, unfitted, u
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
-from study.interface.showing import ABOVE, TABLES, Words, drawing_axes, html_table
+from study.interface.showing import LEGEND_ABOVE, TABLES, Words, drawing_axes, html_table
 from study.support.errors import expect
 from study.support.extras import needed
 from study.support.numbers import percent
@@ -214,7 +214,7 @@ class Diagnosis:
             from study.diagnose.diagnosis_pictures import FOLLOWED, followed
 
             followed(axes, self.result.candidates[:FOLLOWED], along)
-            axes.legend(**ABOVE)
+            axes.legend(**LEGEND_ABOVE)
         return axes
 
     def __repr__(self) -> str:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 7.0, 2.6  # inches of one panel
 # of a legend: above the panel, where it hides nothing
-ABOVE: dict[str, Any] = {
+LEGEND_ABOVE: dict[str, Any] = {
     "loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "borderaxespad": 0.2
 }  # fmt: skip
 TABLES = ("pandas", "a table in a notebook", "notebook")  # what ``extras.needed`` asks for

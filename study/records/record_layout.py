@@ -23,7 +23,7 @@ from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
 PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly that of its neighbours (docs/tool.md)
-BLOCKS = 24  # of a stretch, at most
+BLOCKS_OF_STRETCH = 24  # at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
 STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
@@ -262,7 +262,7 @@ def alternating(
     fit, judge = list[Stretch](), list[Stretch]()
     for number, stretch in enumerate(stretches):
         most = int(len(stretch) / max((anew or PERIODS) * period_of(stretch, sensors), FEWEST))
-        for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS)))):
+        for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS_OF_STRETCH)))):
             block = replace(block, continues=place > 1 and not anew)  # the motion runs on through the blocks between
             (fit if (number + place) % 2 == 0 else judge).append(block)
     return fit, judge

@@ -163,8 +163,8 @@ def load_structures(folder: Path, taken: Iterable[str] = ()) -> Cases[CaseSettin
     source = folder / "structures.yaml"
     settings = read_yaml(source, CaseSettings[CaseTolerances])
     with at(source):
-        unknown = [name for name in settings.estimators if name not in reverse_system.ESTIMATORS]
-        known = ", ".join(reverse_system.ESTIMATORS)
+        unknown = [name for name in settings.estimators if name not in reverse_system.STRUCTURE_ESTIMATORS]
+        known = ", ".join(reverse_system.STRUCTURE_ESTIMATORS)
         expect(not unknown, f"there is no estimator {unknown[:1]} of structures; known are {known}")
         expect("miso" in settings.estimators, "estimators lacks 'miso', whose coherences are drawn of every case")
         low, high = settings.fit_band

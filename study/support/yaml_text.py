@@ -17,7 +17,7 @@ from study.support.errors import StudyError, expect
 from study.support.numbers import LARGEST, SMALLEST
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
-DEEPEST = 8
+DEEPEST_YAML = 8
 EXPECTED = "expected a mapping such as 'name: rig'"
 
 
@@ -52,7 +52,7 @@ def _screen(text: str) -> None:
         kind, line = type(event).__name__, event.start_mark.line + 1
         depth += kind in ("SequenceStartEvent", "MappingStartEvent")
         depth -= kind in ("SequenceEndEvent", "MappingEndEvent")
-        small = depth <= DEEPEST and count <= MOST_EVENTS
+        small = depth <= DEEPEST_YAML and count <= MOST_EVENTS
         expect(small, f"is too large or too deeply nested (line {line}); expected a short list")
         if getattr(event, "anchor", None) is not None:  # an alias has one too: the name it repeats
             raise StudyError(f"uses the YAML anchor or alias {event.anchor!r} in line {line}; write the value itself")

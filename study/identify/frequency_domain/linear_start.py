@@ -22,9 +22,10 @@ from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import End, Point, minimise, point_at
 
-FAINT, CHANCE = 1e-3, 0.01  # as for a single coordinate: share of the strongest line's force, coherence of noise alone
+FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
+CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
 LINES = 300  # at most
-CLEAN = 1e-4  # share of a response that counts as its error at least, where there is no noise
+LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
 POOR = 0.01  # share of the responses' power: a search that leaves more has ended at a local minimum
 ROUNDS, TRIALS = 6, 40  # weighted solutions; runs of a search
 DRAWN, STARTS, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
@@ -79,7 +80,7 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
         said = f"forces and motions of {prepared.record.name!r} have nothing in common at any frequency"
         floats = f"nothing ties {model.name!r} down and what is measured drifts; expected accelerations, which do not"
         raise StudyError(f"{said}: {floats}" if loose_motions(model) else said)
-    noise = own * np.maximum(1.0 - coherence, CLEAN) / max(matrix.averages - n, 1.0)
+    noise = own * np.maximum(1.0 - coherence, LEAST_ERROR) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
     thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]
     return SensorResponses(omega[thin], response[thin], error[thin])

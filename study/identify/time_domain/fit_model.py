@@ -50,9 +50,9 @@ from study.support.errors import DivergenceError, StudyError, expect
 
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
-BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
+DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # resonances over it
 SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
-BESIDE = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
+NEARBY_FACTORS = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
 
@@ -170,7 +170,7 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     omega = driven_at(model, prepared)
     if omega:  # only the transient tells the mass, and a fit begun at another resonance loses step with it
         steady = linear["k"] - linear["m"] * omega**2
-        ratios = BELOW if steady > 0.0 else ABOVE
+        ratios = DRIVEN_BELOW if steady > 0.0 else DRIVEN_ABOVE
         masses = [steady / ((ratio * omega) ** 2 - omega**2) for ratio in ratios]
         starts += [linear | {"m": m, "k": steady + m * omega**2} for m in masses]
     return [{key: value for key, value in start.items() if key not in model.held_keys} for start in starts]
@@ -230,7 +230,7 @@ def _beside_modes(base: Baseline, entry: ModelTerm, points: Sequence[Start]) -> 
     if not found:
         raise StudyError(f"no modes let {entry.name} follow {base.prepared.record.name}; expected an effect that does")
     best = found[0].parameters
-    near = [best] if points or not best else [tuple(factor * x for x in best) for factor in (1.0, *BESIDE)]
+    near = [best] if points or not best else [tuple(factor * x for x in best) for factor in (1.0, *NEARBY_FACTORS)]
     given = {key: value for key, value in entry.values.items() if value is not None}
     shapes = [[x if own is None else own for x, own in zip(p, entry.parameters, strict=True)] for p in near]
     return with_modal_term(base.fit, entry, shapes, base.prepared, tuple(given))

@@ -10,7 +10,7 @@ from study.support.errors import StudyError, at, expect
 from study.support.files import read_text
 from study.support.yaml_text import as_list, as_mapping, read_plain, shown
 
-BESIDE = ".record.yaml"
+OPTIONS_SUFFIX = ".record.yaml"
 WANTED = "a YAML file with 'columns', 'units', 'scale', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
 
 
@@ -89,7 +89,7 @@ def assignments(texts: Sequence[str], option: str) -> dict[str, str]:
 
 def options_beside(path: Path) -> Path:
     """Where the options of a file may stand: ``rig.record.yaml`` for ``rig.csv``."""
-    return path.with_suffix(BESIDE) if path.name else path
+    return path.with_suffix(OPTIONS_SUFFIX) if path.name else path
 
 
 def read_options(path: Path) -> ReadOptions:

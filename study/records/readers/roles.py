@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 from study.records.driven_by_motion import BASE
-from study.records.readers.options import BESIDE, ReadOptions
+from study.records.readers.options import OPTIONS_SUFFIX, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import ALONE, MOTIONS, Sensor
 from study.support.errors import StudyError, expect
@@ -230,5 +230,5 @@ def _ask(path: Path, table: Table, roles: Roles, problem: str) -> StudyError:
     wanted = " ".join(f"--column {channel}=NAME" for channel in (*roles.forces[:1], _motion_of(roles)))
     return StudyError(
         f"{path}: {problem}; the columns are {table.listing()}: name them by {wanted}{choose}, or in "
-        f"{path.stem}{BESIDE}"
+        f"{path.stem}{OPTIONS_SUFFIX}"
     )

@@ -179,7 +179,7 @@ def extreme_linear(evidence: Evidence, reported: Reported) -> Iterator[Condition
     yield from recovered(evidence, reported, ensemble, ("m", "c", "k"))
 
 
-CLAIMS = claims(
+DEAD_BAND_CLAIMS = claims(
     dead_band_as_duffing, dead_band_not_invariant, dead_band_linear, dead_band_stiffness, dead_band_error,
     dead_band_share, dead_band_coherence, linear_dominates, extreme_siso, extreme_linear,
 )  # fmt: skip

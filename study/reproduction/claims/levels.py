@@ -301,7 +301,7 @@ def conclusion_5_noise(evidence: Evidence, reported: Reported) -> list[Condition
     return explained("noise on u biases the reverse estimate, most where the response is weak", conditions)
 
 
-CLAIMS = claims(
+LEVEL_CLAIMS = claims(
     levels_similar, noise_random_only, noise_output, noise_random, noise_linear, noise_cubic, noise_coherence,
     noise_instruments, conclusion_3, conclusion_4, conclusion_5_noise,
 )  # fmt: skip
