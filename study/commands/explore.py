@@ -29,7 +29,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.equations.model_file import WANTED, parse_model
+    from study.equations.model_file import MODEL_FILE, parse_model
     from study.support.extras import needed
 
     needed("bokeh", "'study explore'", "explore")
@@ -40,7 +40,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])
-    text, steps = read_text(arguments.model, WANTED), history.read_history(arguments.model)
+    text, steps = read_text(arguments.model, MODEL_FILE), history.read_history(arguments.model)
     model = parse_model(text, arguments.model)
     desk = Desk(_begun(arguments, model, steps), arguments.model, text, folder, inputs_of(arguments))
     try:

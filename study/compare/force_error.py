@@ -30,7 +30,7 @@ from study.identify.frequency_domain.inputs import (
     with_known_changes,
     without_inertia,
 )
-from study.records.plan import FEWEST
+from study.records.plan import SHORTEST_PART
 from study.records.prepared import FORCE
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra, cross_spectra_within
@@ -197,7 +197,7 @@ def force_error(model: Model, view: SensorPrediction) -> ForceError | None:
 def _segments(stretches: Sequence[int], inputs: int) -> Segments:
     """The usual segments, shortened until there are enough averages for so many inputs; lengths of the stretches."""
     cut, wanted = segments_of(sum(stretches)), FEWEST_AVERAGES * inputs
-    while cut.length > FEWEST and sum(cut.effective_averages(n) for n in stretches if n >= cut.length) < wanted:
+    while cut.length > SHORTEST_PART and sum(cut.effective_averages(n) for n in stretches if n >= cut.length) < wanted:
         cut = replace(cut, length=cut.length // 2)
     return cut
 

@@ -71,9 +71,7 @@ def visits_in_blocks(lacking: MissingForce) -> Visits:
 
 def _bounds(samples: int) -> NDArray[np.int64]:
     """First sample of each block, and the one after the last."""
-    return (
-        np.linspace(0, samples, int(np.clip(samples // IN_A_BLOCK, 1, LINK_BLOCKS)) + 1).round().astype(np.int64)
-    )
+    return np.linspace(0, samples, int(np.clip(samples // IN_A_BLOCK, 1, LINK_BLOCKS)) + 1).round().astype(np.int64)
 
 
 def _place(values: Floats, bounds: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -25,7 +25,7 @@ MEASURED: dict[str, Any] = {"color": "0.62", "label": "measured"}
 PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}
 RESIDUAL: dict[str, Any] = {"color": "C1", "label": "measured less predicted"}
 DOTTED: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
-FLOOR = 1e-6  # shares below are drawn there
+LOWEST_DRAWN = 1e-6  # shares below are drawn there
 
 
 def time_history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **more: Any) -> Axes:
@@ -101,7 +101,7 @@ def _limits(error: ForceError, keep: NDArray[np.bool_]) -> tuple[float, float]:
 
 
 def _shown(share: Floats) -> Floats:
-    return np.maximum(share, FLOOR)
+    return np.maximum(share, LOWEST_DRAWN)
 
 
 def missing_force_panel(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:

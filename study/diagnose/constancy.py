@@ -20,7 +20,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.least_squares import length_or_one
 from study.support.thresholds import ALPHA, TOLERANCE
 
-INDISTINCT = 1e-6
+LEAST_ALONE = 1e-6
 FREQUENCY_BANDS = 8
 AMPLITUDE_CLASSES = 4
 BLOCK = 64  # samples: long against a period, short against the swell of the amplitude
@@ -126,7 +126,7 @@ def curves(
     own = jacobian[:, columns] @ (direction / size)
     basis = np.linalg.qr(np.delete(jacobian / length_or_one(jacobian), columns, axis=1))[0]
     alone = own - basis @ (basis.T @ own)
-    if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
+    if np.linalg.norm(alone) <= LEAST_ALONE * np.linalg.norm(own):
         return None, None
     each, left = alone.reshape(-1, sensors).T, fit.residual.reshape(-1, sensors).T
     most = int(np.argmax(np.sum(each**2, axis=1)))

@@ -40,7 +40,7 @@ MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_kn
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-COMPARED_SETS = 12  # near the best, in every detail
+RIVALS = 12  # sets near the best that are compared with it in every detail
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,9 +347,7 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
     alone = {row.name: row for row in rows}
     every = sorted(search.tried.values(), key=by_power)
     best = every[0]
-    near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][
-        :COMPARED_SETS
-    ]
+    near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:RIVALS]
     near += [c for names, c in search.tried.items() if c not in near and any(names < set(n.names) for n in near[:3])]
     found = [alone.get(c.name, c) for c in near]
     return rank(with_best_settled(found, comparison.prepared), comparison, asked + len(search.tried))

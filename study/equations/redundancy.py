@@ -12,7 +12,7 @@ from study.equations.model import Model
 from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
-POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
+POINTS, FEWEST_FINITE = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
 NOTHING = 1e-150  # a force below counts as zero
 SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
@@ -80,7 +80,7 @@ def _forces(model: Model, motion: Mapping[str, Floats]) -> tuple[tuple[str, ...]
     program = graph.program([unit_force(graph, c, inputs, None) for _, c in pairs])
     values = kernels.evaluate(program, {name: motion[name] for name in inputs}, len(motion["u"]))
     names, finite = tuple(name for name, _ in pairs), np.all(np.isfinite(values), axis=1)
-    return names, values[finite] if np.count_nonzero(finite) >= FEWEST else np.eye(len(names))
+    return names, values[finite] if np.count_nonzero(finite) >= FEWEST_FINITE else np.eye(len(names))
 
 
 def _made_of(model: Model, names: Sequence[str], values: Floats, i: int, *, evenly: bool) -> list[str]:

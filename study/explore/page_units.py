@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from study.figures import labels
 from study.support.errors import StudyError
 from study.support.numbers import percent
-from study.support.units import FORCE, LENGTH, role_unit
+from study.support.units import A_FORCE, A_LENGTH, role_unit
 
 EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
 EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
@@ -112,7 +112,7 @@ def mass(unit: str) -> Scale:
         force, length = role_unit("force", wanted[1]), role_unit("displacement", wanted[2])
     except StudyError:  # counts
         return Scale(1.0, unit)
-    if (force.powers, length.powers) != (FORCE, LENGTH):  # volts
+    if (force.powers, length.powers) != (A_FORCE, A_LENGTH):  # volts
         return Scale(1.0, unit)
     return Scale(length.factor / force.factor, "kg")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.compare.comparison import Comparison
 from study.compare.dependence import explained_by_place
-from study.compare.force_map import FEWEST, surface
+from study.compare.force_map import FEWEST_VISITS, surface
 from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
@@ -28,7 +28,7 @@ UNTIED = "The model ties nothing here, or no equation with it is measured."
 def one_place(focus: Focus, seen: bool, tied: bool) -> dict[str, str]:
     """The fragments of the place that is looked at: whether its motion is ``seen``, and its stiffness known."""
     plane = surface(*focus.within).mean
-    short = f"no cell is visited {FEWEST} times: too short a record for a map"
+    short = f"no cell is visited {FEWEST_VISITS} times: too short a record for a map"
     unseen = "" if seen else UNSEEN
     return {
         "force-unit": escape(in_text(focus.force.unit)),

@@ -232,12 +232,12 @@ def history(s: Sources, height: int) -> Any:
     return drawn
 
 
-HEIGHT = 228  # pixels
+PANEL_HEIGHT = 228  # pixels
 
 
 def loop(s: Sources, of: str) -> Any:
     """Force over the motion that was prescribed, measured and by the model."""
-    drawn = theme.panel(f"loop_{of}", HEIGHT, of, "force", narrow=True)
+    drawn = theme.panel(f"loop_{of}", PANEL_HEIGHT, of, "force", narrow=True)
     measured = drawn.scatter(of, "measured", source=s["loops"], size=3.2, fill_color="#a3adb7", line_color=None)
     predicted = drawn.scatter(of, "predicted", source=s["loops"], size=1.8, fill_color=theme.BLUE, line_color=None)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
@@ -246,7 +246,7 @@ def loop(s: Sources, of: str) -> Any:
 
 def cycles(s: Sources) -> Any:
     """Energy that each cycle takes, over its stroke."""
-    drawn = theme.panel("cycles", HEIGHT, "stroke", "energy", narrow=True)
+    drawn = theme.panel("cycles", PANEL_HEIGHT, "stroke", "energy", narrow=True)
     look: dict[str, Any] = {"source": s["cycles"], "line_width": 1.3}
     measured = drawn.scatter("stroke", "measured", size=6, fill_color="#a3adb7", line_color="#5c6873", **look)
     predicted = drawn.scatter("stroke", "predicted", marker="x", size=7, line_color=theme.BLUE, **look)
@@ -257,7 +257,7 @@ def cycles(s: Sources) -> Any:
 
 def decay(s: Sources, of: str, label: str) -> Any:
     """Frequency or damping ratio of a decay against its amplitude."""
-    drawn = theme.panel(f"decay_{of}", HEIGHT, "amplitude", label, x_axis_type="log")
+    drawn = theme.panel(f"decay_{of}", PANEL_HEIGHT, "amplitude", label, x_axis_type="log")
     bars = drawn.segment("at", f"{of}_low", "at", f"{of}_high", source=s["decay"], line_color="#5c6873", line_width=1.0)
     dots = drawn.scatter("at", of, source=s["decay"], size=5.5, fill_color="#a3adb7", line_color="#5c6873")
     model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED)
@@ -269,7 +269,7 @@ def decay(s: Sources, of: str, label: str) -> Any:
 def magnitude(s: Sources, frequency: Any) -> Any:
     """Response over force, measured with its 95 % band and by the model."""
     drawn = theme.panel(
-        "frf", HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
+        "frf", PANEL_HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
     )
     band = drawn.varea("f", "low", "high", source=s["frf"], fill_color="#a3adb7", fill_alpha=0.35)
     measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED)
@@ -282,7 +282,7 @@ def magnitude(s: Sources, frequency: Any) -> Any:
 def phase(s: Sources, frequency: Any) -> Any:
     """Its phase in degrees."""
     ranges = (frequency, theme.fixed("range_phase", -190.0, 190.0))
-    drawn = theme.panel("phase", HEIGHT, "frequency / Hz", "phase / °", narrow=True, ranges=ranges)
+    drawn = theme.panel("phase", PANEL_HEIGHT, "frequency / Hz", "phase / °", narrow=True, ranges=ranges)
     drawn.yaxis.ticker = [-180, -90, 0, 90, 180]
     measured = drawn.line("f", "phase", source=s["frf"], **theme.MEASURED)
     predicted = drawn.line("f", "phase_predicted", source=s["frf"], **theme.PREDICTED)
@@ -293,7 +293,7 @@ def phase(s: Sources, frequency: Any) -> Any:
 def linearity(s: Sources, frequency: Any) -> Any:
     """Ordinary coherence of force and response: below one in both, the system is nonlinear; in one, noise or a lack."""
     ranges = (frequency, theme.fixed("range_linearity", 0.0, 1.03))
-    drawn = theme.panel("linearity", HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)
+    drawn = theme.panel("linearity", PANEL_HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)
     measured = drawn.line("f", "coherence", source=s["frf"], **theme.MEASURED)
     predicted = drawn.line("f", "coherence_predicted", source=s["frf"], **theme.PREDICTED)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
@@ -302,7 +302,7 @@ def linearity(s: Sources, frequency: Any) -> Any:
 
 def correlation(s: Sources, name: str, label: str) -> Any:
     """A correlation of the residual, with the 99 % band of what is noise."""
-    drawn = theme.panel(name, HEIGHT, "lag / s", label, narrow=True)
+    drawn = theme.panel(name, PANEL_HEIGHT, "lag / s", label, narrow=True)
     drawn.add_layout(Span(location=0.0, dimension="width", line_color=theme.AXIS, line_width=1.0))
     line = drawn.line("lag", "value", source=s[name], line_color=theme.ORANGE, line_width=1.3)
     band = drawn.multi_line("lag", "level", source=s[f"{name}_band"], **theme.NOISE)
@@ -313,7 +313,7 @@ def correlation(s: Sources, name: str, label: str) -> Any:
 
 def histogram(s: Sources) -> Any:
     """Distribution of the residual beside a normal one."""
-    drawn = theme.panel("histogram", HEIGHT, "difference / σ", "density / 1", narrow=True)
+    drawn = theme.panel("histogram", PANEL_HEIGHT, "difference / σ", "density / 1", narrow=True)
     bars = drawn.quad(
         left="left", right="right", top="top", bottom=0.0, source=s["histogram"], fill_color="#a3adb7",
         fill_alpha=0.6, line_color=None,

@@ -29,7 +29,7 @@ RUNS = 32  # of the model with noise on its force
 LITTLE = 0.01  # of the force: the noise of the first runs, those that follow have what was found
 REPEATS = 5  # of the runs, until size and colour of the noise no longer change
 FADED = 0.1  # of a part of a record at either end
-KEPT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
+INDEPENDENT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
 LINES = 5  # of a spectrum, over which the mean of these runs is taken
 SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 
@@ -65,12 +65,13 @@ def force_noise(left: FittedResidual, forces: Sequence[str], asked: int, repeats
     on_responses = sum(
         min(_likely(own[:, None], _first_order(memory, turn)[:, None]).cost for memory in MEMORIES) for own in power.T
     )
-    likely = [(name, _on_force(left, name, power, turn, on_responses - np.log(asked / ALPHA) / KEPT, repeats))
+    likely = [(name, _on_force(left, name, power, turn, on_responses - np.log(asked / ALPHA) / INDEPENDENT, repeats))
               for name in forces]  # fmt: skip
     name, found = min(likely, key=lambda one: min((noise.cost for noise in one[1]), default=np.inf))
     if not found:
         return None
-    costs = KEPT * np.array([noise.cost for noise in found])  # the rms is that of all colours by how likely each is
+    # the rms is that of all colours by how likely each is
+    costs = INDEPENDENT * np.array([noise.cost for noise in found])
     weights = np.exp(np.min(costs) - costs)
     weights /= float(np.sum(weights))
     sizes, errors = np.array([noise.rms for noise in found]), np.array([noise.error_of_rms for noise in found])
@@ -185,7 +186,7 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
     between = np.asarray(np.sum(coherent, axis=0), dtype=np.float64)
     together = between.T @ between - np.einsum("ilp,ilq->pq", coherent, coherent)
     variance = inverse + inverse @ together @ inverse  # never below that of spectra that tell of nothing in common
-    error = float(np.sqrt(max(variance[0, 0], inverse[0, 0]) / KEPT))
+    error = float(np.sqrt(max(variance[0, 0], inverse[0, 0]) / INDEPENDENT))
     return _Noise(float(amounts[0]) / level, error / level, cost, float(amounts[0]))
 
 

@@ -30,9 +30,9 @@ from study.support.statistics import Gain, clustered_covariance, gain, gain_besi
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
-INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
+IMITATED = 1e-5  # share of a column's length that the model's own coefficients leave of it
 SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
-FITTED = 5  # effects of the largest linear share that are fitted
+STRONGEST = 5  # effects, by their linear share, that are fitted
 AS_GOOD = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
@@ -276,7 +276,7 @@ def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Shar
     fitted, judged = left.known(columns)
     taken = left.taking[0] @ fitted
     alone = fitted - left.own[0] @ taken
-    if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
+    if np.any(np.linalg.norm(alone, axis=0) <= IMITATED * np.linalg.norm(fitted, axis=0)):
         return None
     change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
     whole, covariance = amounts_on_both(left, columns)
@@ -375,7 +375,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
 
     begins = side_by_side(lambda e: shape_search.shape_starts(e, base), entries, lambda e: e.term.effort)
     starts = [(entry, found) for entry, found in zip(entries, begins, strict=True) if found]
-    promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
+    promising = sorted(starts, key=lambda s: -s[1][0].share)[:STRONGEST]
     tried = [t for t in side_by_side(fitted, promising, lambda begun: begun[0].term.effort) if t is not None]
     for group in ([t for t in tried if not unphysical(t, left)], tried):
         if group:  # of those that chance may make worse than the best, the one with the fewest unknowns

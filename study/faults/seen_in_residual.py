@@ -20,7 +20,7 @@ from study.support.arrays import Bools, Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
 
 SLOWEST, NEXT = 8, 32  # cosines, of half a period each more than the one before, that are held against the next
-FEWEST = 256  # samples that show both
+ENOUGH_SAMPLES = 256  # to show both
 HARMONICS = tuple(sorted(n * mains for n in range(1, 7) for mains in (50.0, 60.0)))  # of the mains, in hertz
 WANDER = 1e-3  # share by which the mains' frequency wanders
 LINES_BESIDE = 24  # lines on either side that a line is held against
@@ -73,7 +73,7 @@ def mean_response(prepared: Prepared, channel: str) -> Fault:
 
 def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     """How many of the slowest lines stand above the next, and the mean power of these; None without any."""
-    if len(values) < FEWEST:
+    if len(values) < ENOUGH_SAMPLES:
         return None
     lines = np.asarray(dct(values, norm="ortho"), dtype=np.float64)
     if _p_value(lines, 1, SLOWEST, NEXT) * asked >= ALPHA:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from study.compare import history
+from study.diagnose.verdict import MISSING, NOTHING
 from study.support import document
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
@@ -31,14 +32,13 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/missing_force.png": "the force that the final model still lacks",
     "climb/force_error.png": "unexplained force by frequency, final model",
 }
-KEPT = (
+DOCUMENTED_PICTURES = (
     "climb/decay.png",
     "climb/loops.png",
     "climb/step_0/structure.png",
     "climb/response.png",
     "climb/step_0/constancy.png",
 )  # the first of these that there is stands in the documentation
-MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
 Fields = dict[str, Any]
 
 
@@ -360,7 +360,7 @@ def climb_pictures(found: RecordFindings) -> list[Picture]:
 
 def kept(found: RecordFindings) -> list[str]:
     """Names of the pictures that the documentation keeps of a record."""
-    return [name for name in KEPT if (found.folder / name).is_file()][:1]
+    return [name for name in DOCUMENTED_PICTURES if (found.folder / name).is_file()][:1]
 
 
 def picture_name(found: RecordFindings, name: str) -> str:

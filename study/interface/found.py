@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from study.interface.planned import PlannedTest
 
-MISSING, NOTHING, UNKNOWN = verdicts.MISSING, verdicts.NOTHING, verdicts.UNKNOWN
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate:
@@ -211,9 +209,9 @@ class Diagnosis:
         """
         expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
         with drawing_axes(ax) as (axes,):
-            from study.diagnose.diagnosis_pictures import FOLLOWED, followed
+            from study.diagnose.diagnosis_pictures import CANDIDATES_FOLLOWED, followed
 
-            followed(axes, self.result.candidates[:FOLLOWED], along)
+            followed(axes, self.result.candidates[:CANDIDATES_FOLLOWED], along)
             axes.legend(**LEGEND_ABOVE)
         return axes
 

@@ -17,7 +17,7 @@ SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the no
 CLEAR = 3.0  # standard errors by which a line must stand above the noise, to be used
 SMOOTH = 5  # lines that are averaged
 BANDS = 20  # bands of the spectrum, or as many as there are lines
-FEWEST = 8  # lines that show a noise floor
+FEWEST_NOISE_LINES = 8  # to show a noise floor
 QUIET = 5  # bands, the quietest, that give the floor
 
 
@@ -42,10 +42,10 @@ def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
     frequency, density = autospectrum(residual, dt, segments)
     averages = segments.effective_averages(len(residual))
     kept = density[1:-1][frequency[1:-1] >= low]
-    if len(kept) < FEWEST:
+    if len(kept) < FEWEST_NOISE_LINES:
         raise StudyError(
             f"{len(residual)} samples are judged, of whose spectrum {len(kept)} lines lie above {low:.3g} Hz; "
-            f"{FEWEST} or more show a noise floor: judge a longer part"
+            f"{FEWEST_NOISE_LINES} or more show a noise floor: judge a longer part"
         )
     count = min(BANDS, len(kept))
     quietest = max(1, count * QUIET // BANDS)

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.records.completion import complete
 from study.records.outputs import Outputs
-from study.records.plan import FEWEST, Plan, compared_sensors, make_plan
+from study.records.plan import SHORTEST_PART, Plan, compared_sensors, make_plan
 from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Bools, Floats
 
@@ -119,7 +119,7 @@ class Prepared:
             return self
         if self.record.joints:  # of a stretch that would be cut to a rest of few samples, none
             end = self.record.stretch_of(last - samples)[1]
-            return self.with_fit(end if end - (last - samples) < FEWEST and end < last else last - samples, last)
+            return self.with_fit(end if end - (last - samples) < SHORTEST_PART and end < last else last - samples, last)
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
 
 

@@ -384,7 +384,7 @@ def integrator_blocks(results: Results) -> list[Block]:
 
     said = (
         "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({ensemble.FINE.method}, {ensemble.FINE.steps_per_sample} steps a sample), with its standard error; "
+        f"({ensemble.FINELY.method}, {ensemble.FINELY.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
         "The report's own setting is abm4 with one step a sample (Section 2.2)."
     )

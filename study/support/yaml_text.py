@@ -18,7 +18,7 @@ from study.support.numbers import LARGEST, SMALLEST
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
 DEEPEST_YAML = 8
-EXPECTED = "expected a mapping such as 'name: rig'"
+EXPECTED_MAPPING = "expected a mapping such as 'name: rig'"
 
 
 def _yaml() -> Any:
@@ -37,12 +37,12 @@ def read_plain(text: str) -> object:
         told: Any = error
         line = f" in line {told.problem_mark.line + 1}" if told.problem_mark else ""
         problem = excerpt(str(told.problem or told.context).splitlines()[0])
-        raise StudyError(f"is not YAML ({problem}{line}); {EXPECTED}") from None
+        raise StudyError(f"is not YAML ({problem}{line}); {EXPECTED_MAPPING}") from None
     except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
         problem = (str(error) or type(error).__name__).splitlines()[0]
         if problem.startswith("Exceeds the limit"):  # Python reads no number of thousands of digits
             problem = "a number of too many digits"
-        raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED}") from None
+        raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED_MAPPING}") from None
 
 
 def _screen(text: str) -> None:

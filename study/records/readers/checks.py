@@ -23,7 +23,7 @@ JITTER = 0.01  # of the sampling interval: what is uneven by less is even, and w
 ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed times that still shows a lost sample
 CONTENT = 1e-6  # of its maximum: autospectra below are leakage
 COHERENT = 0.3  # lines less coherent than this say little
-FEWEST_LINES = 8
+FEWEST_COHERENT = 8  # lines
 BETTER = 0.7  # the swapped reading must miss by less than this share of what the given one misses by
 
 
@@ -242,7 +242,7 @@ def _lines(record: Record) -> _Lines | None:
     """None where a record is too short or too incoherent to tell."""
     (force,), sensor = record.forces, next(s for m in MOTIONS if (s := Sensor(record.coordinates[0], m)) in record)
     length = min(1024, len(record) // 8)  # 500 lines are plenty for three coefficients
-    if length < 4 * FEWEST_LINES:
+    if length < 4 * FEWEST_COHERENT:
         return None
     matrix = cross_spectra([record[force], record[sensor]], record.dt, Segments(length))
     g, frequency = matrix.density, matrix.frequency
@@ -250,7 +250,7 @@ def _lines(record: Record) -> _Lines | None:
     weight = np.abs(cross) ** 2 / np.maximum(drive * response, np.finfo(float).tiny)
     keep = (weight > COHERENT) & (drive > CONTENT * drive.max()) & (response > CONTENT * response.max())
     keep[:2] = False  # offset and drift
-    if np.count_nonzero(keep) < FEWEST_LINES:
+    if np.count_nonzero(keep) < FEWEST_COHERENT:
         return None
     omega = 2.0 * np.pi * frequency[keep]
     ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])
