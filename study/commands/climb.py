@@ -13,8 +13,9 @@ from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.equations.model_file import MODEL_FILE, parse_model
+from study.explore import PAGE
 from study.explore import session as sessions
-from study.explore.saved import PAGE, files
+from study.explore.saved import files
 from study.explore.session import Session
 from study.support.files import read_text, write_files
 

@@ -14,6 +14,7 @@ from study.commands.record_arguments import (
     separated_records,
     sources,
 )
+from study.explore import PAGE
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from study.compare.comparison import Comparison
     from study.compare.fitted_coefficients import Level
 
-PAGE = "explore.html"
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
 
 

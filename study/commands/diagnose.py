@@ -15,6 +15,7 @@ from study.commands.record_arguments import (
     separated_records,
     sources,
 )
+from study.explore import PAGE
 
 if TYPE_CHECKING:
     from study.compare.each_record import Separate
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
-
-PAGE = "explore.html"
 
 
 def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:

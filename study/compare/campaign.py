@@ -18,7 +18,7 @@ from study.figures.labels import prefixed, term_names
 from study.support import document
 from study.support.numbers import percent
 
-TITLE = "Measured records"
+MEASURED_RECORDS = "Measured records"
 VERDICTS_IN_WORDS = {
     "missing_effect": "an effect is missing", "missing_effects": "several effects are missing",
     "partly_known": "effects are missing, and something that has no name", "nothing_missing": "nothing is missing",
@@ -102,7 +102,7 @@ def campaign_blocks(
     said = "; ".join(f"{word} in {count}" for word, count in counts if count)
     heading = ("record", "level", "error", "noise floor", "verdict", "effects", "explain", "error with them")
     page: list[document.Block] = [
-        document.Heading(TITLE, 1), document.Text(f"{len(every)} records: {said}."),
+        document.Heading(MEASURED_RECORDS, 1), document.Text(f"{len(every)} records: {said}."),
         document.Bullets(tuple(sentence for rig, rows in rigs.items() for sentence in _differences(rig[0], rows))),
         document.table(heading, [_verdict(record) for record in every]),
     ]  # fmt: skip

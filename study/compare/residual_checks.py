@@ -16,8 +16,8 @@ from study.compare.response_functions import drive_of
 from study.support.arrays import Floats
 
 LAGS = 100  # to each side, at most
-LEVEL = 0.99  # of the bands, at each lag
-QUANTILE = float(ndtri(0.5 + LEVEL / 2.0))
+BAND_LEVEL = 0.99  # at each lag
+QUANTILE = float(ndtri(0.5 + BAND_LEVEL / 2.0))
 BINS = 41
 REACH = 4.0  # standard deviations of the histogram
 

@@ -11,7 +11,8 @@ from study.equations.layout import check
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain.starting_values import reverse_start
-from study.identify.time_domain.fit_model import NEAR, best_fit, fit_model, grown_states
+from study.identify.time_domain.continuation import NEAR
+from study.identify.time_domain.fit_model import best_fit, fit_model, grown_states
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.weighted_fit import finished

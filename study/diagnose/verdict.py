@@ -38,8 +38,8 @@ from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNS
 
 MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
-SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
-MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
+LONGEST_SEARCH = 16384  # samples: it uses half of the fitting part if that is more than the least, up to these
+NAMED_FIRST = 0.5  # of what is unexplained: an effect of a component, or of a decay, that explains it is named first
 RIVALS = 12  # sets near the best that are compared with it in every detail
 
 
@@ -215,11 +215,11 @@ def search_part(prepared: Prepared) -> Prepared:
     More where that is a quiet stretch, such as the end of a sweep, which shows less than half of the motion's size.
     """
     if prepared.record.stretches:  # what is loud and what is quiet lie in stretches of their own
-        return prepared.shortened(LONG)
+        return prepared.shortened(LONGEST_SEARCH)
     first, last = prepared.plan.fit
-    wanted = max((last - first) // 2, prepared.samples_in(shape_search.PERIODS))
-    look = prepared.shortened(int(np.clip(wanted, SHORT, LONG)))
-    return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONG)
+    wanted = max((last - first) // 2, prepared.samples_in(shape_search.SEARCH_PERIODS))
+    look = prepared.shortened(int(np.clip(wanted, shape_search.SEARCH_SAMPLES, LONGEST_SEARCH)))
+    return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONGEST_SEARCH)
 
 
 def search_base(comparison: Comparison) -> Baseline:
@@ -260,7 +260,7 @@ def _decide(
         if first.unknowns <= 2 and not ((first.flexible or changing) and one.left > TOLERANCE):
             return one
         # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
-        fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
+        fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST_EFFECTS + 1
     changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
     known = {c.name for c in tried}
@@ -339,7 +339,7 @@ def _verdict_on(sets: Sequence[Ranked], left: float, prepared: Prepared, asked: 
     if explained >= NEARLY and not one:
         return SEVERAL
     necessary = all(set(answer.names) <= set(row.names) for row in sets)
-    return PARTLY_KNOWN if explained >= MOST and necessary and not answer.wanders(asked) else UNKNOWN
+    return PARTLY_KNOWN if explained >= NAMED_FIRST and necessary and not answer.wanders(asked) else UNKNOWN
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
@@ -422,7 +422,7 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
     """
     alone = prepared.response == FORCE or prepared.free
-    return alone and first.gain.explained > MOST and not first.unphysical
+    return alone and first.gain.explained > NAMED_FIRST and not first.unphysical
 
 
 def _leaves_nothing(candidate: FittedCandidate) -> bool:

@@ -13,7 +13,7 @@ from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
 POINTS, FEWEST_FINITE = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
-NOTHING = 1e-150  # a force below counts as zero
+NO_FORCE = 1e-150  # what is below counts as zero
 SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 
@@ -34,7 +34,7 @@ def repeated_force(model: Model) -> str | None:
     names, values = _forces(model, dict(zip(variables, data.T, strict=True)))
     size = np.max(np.abs(values), axis=0)
     for i in (i for i, name in enumerate(names) if name not in LIBRARY):
-        if size[i] < NOTHING:
+        if size[i] < NO_FORCE:
             return f"the force of {names[i]!r} is zero at every motion; expected a formula that changes with u, v or t"
         if parts := _made_of(model, names, values, i, evenly=True):
             return (
@@ -90,12 +90,12 @@ def _made_of(model: Model, names: Sequence[str], values: Floats, i: int, *, even
     """
     held = {t.name for t in model.terms if None not in t.coefficients}
     size = np.max(np.abs(values), axis=0)
-    if names[i] in held or size[i] < NOTHING:
+    if names[i] in held or size[i] < NO_FORCE:
         return []
-    others = [j for j, name in enumerate(names) if name not in held and size[j] >= NOTHING and j != i]
+    others = [j for j, name in enumerate(names) if name not in held and size[j] >= NO_FORCE and j != i]
     own = values[:, [i, *others]]
     if evenly:
-        own = own / np.maximum(np.max(np.abs(own), axis=1), NOTHING)[:, None]
+        own = own / np.maximum(np.max(np.abs(own), axis=1), NO_FORCE)[:, None]
     shares = _shares(own[:, 0], own[:, 1:])
     found = [] if shares is None else [names[j] for j, share in zip(others, shares, strict=True) if share > TAKES_PART]
     return list(dict.fromkeys(found))

@@ -204,10 +204,10 @@ OF_VARIATION = "of what it varies with"  # time, or a channel of any unit
 QUANTITIES = {
     "length": dimensions.VARIABLES["u"],
     "time": dimensions.VARIABLES["t"],
-    "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
+    "frequency": (dimensions.DIMENSIONLESS[0], dimensions.DIMENSIONLESS[1] - 1),
     "velocity": dimensions.VARIABLES["v"],
-    "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
-    OF_VARIATION: dimensions.NONE,
-    "number": dimensions.NONE,
+    "1/length": (dimensions.DIMENSIONLESS[0] - 1, dimensions.DIMENSIONLESS[1]),
+    OF_VARIATION: dimensions.DIMENSIONLESS,
+    "number": dimensions.DIMENSIONLESS,
 }
 STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements

@@ -11,7 +11,7 @@ from study.support.units import A_FORCE, A_LENGTH, role_unit
 
 EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
 EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
-LONG = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
+LONG_NUMBER = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
 KNOWN = 1e4  # times its error: a value that is larger
 PLAIN = (-3, 5)  # powers of ten from which on, and up to which, no power is written
 NO_BREAK = "\u00a0"
@@ -92,7 +92,7 @@ def in_sentence(text: str) -> str:
     Nor more than five digits before the point, but for what is counted.
     """
     plain = re.sub(EXPONENT, lambda m: f"{m[1]}·10{str(int(m[2])).translate(RAISED)}", text)
-    plain = re.sub(LONG, _in_powers, plain)
+    plain = re.sub(LONG_NUMBER, _in_powers, plain)
     return re.sub(r"\^(-?[0-9]+)", lambda m: m[1].translate(RAISED), plain.replace("+-", "±"))
 
 

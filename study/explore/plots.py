@@ -26,8 +26,8 @@ def response(s: Sources, time: Any) -> Any:
     drawn = theme.panel("response", 170, "", "response", select=True, ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
-    measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
-    predicted = drawn.line("t", "predicted", source=s["time"], **theme.PREDICTED)
+    measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED_LINE)
+    predicted = drawn.line("t", "predicted", source=s["time"], **theme.PREDICTED_LINE)
     theme.chosen(drawn, "box_response")
     theme.follows(drawn, [measured, predicted])
     theme.legend(drawn, [("measured", [measured]), ("free run of the model", [predicted])])
@@ -53,8 +53,8 @@ def difference(s: Sources, time: Any) -> Any:
 def close(s: Sources) -> Any:
     """The same where the model misses most, or where a stretch was selected."""
     drawn = theme.panel("close", 348, "time / s", "response", narrow=True)
-    measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED | {"line_width": 3.4})
-    predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED | {"line_width": 1.5})
+    measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED_LINE | {"line_width": 3.4})
+    predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED_LINE | {"line_width": 1.5})
     theme.legend(drawn, [("measured", [measured]), ("free run", [predicted])])
     return drawn
 
@@ -260,7 +260,7 @@ def decay(s: Sources, of: str, label: str) -> Any:
     drawn = theme.panel(f"decay_{of}", PANEL_HEIGHT, "amplitude", label, x_axis_type="log")
     bars = drawn.segment("at", f"{of}_low", "at", f"{of}_high", source=s["decay"], line_color="#5c6873", line_width=1.0)
     dots = drawn.scatter("at", of, source=s["decay"], size=5.5, fill_color="#a3adb7", line_color="#5c6873")
-    model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED)
+    model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED_LINE)
     drawn.x_range.range_padding = 0.06
     theme.legend(drawn, [("measured, 95 %", [dots, bars]), ("model", [model])])
     return drawn
@@ -272,8 +272,8 @@ def magnitude(s: Sources, frequency: Any) -> Any:
         "frf", PANEL_HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
     )
     band = drawn.varea("f", "low", "high", source=s["frf"], fill_color="#a3adb7", fill_alpha=0.35)
-    measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "predicted", source=s["frf"], **theme.PREDICTED)
+    measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.follows(drawn, [measured, predicted])
     theme.legend(drawn, [("measured, 95 %", [measured, band]), ("model", [predicted])])
     return drawn
@@ -284,8 +284,8 @@ def phase(s: Sources, frequency: Any) -> Any:
     ranges = (frequency, theme.fixed("range_phase", -190.0, 190.0))
     drawn = theme.panel("phase", PANEL_HEIGHT, "frequency / Hz", "phase / °", narrow=True, ranges=ranges)
     drawn.yaxis.ticker = [-180, -90, 0, 90, 180]
-    measured = drawn.line("f", "phase", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "phase_predicted", source=s["frf"], **theme.PREDICTED)
+    measured = drawn.line("f", "phase", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "phase_predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
     return drawn
 
@@ -294,8 +294,8 @@ def linearity(s: Sources, frequency: Any) -> Any:
     """Ordinary coherence of force and response: below one in both, the system is nonlinear; in one, noise or a lack."""
     ranges = (frequency, theme.fixed("range_linearity", 0.0, 1.03))
     drawn = theme.panel("linearity", PANEL_HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)
-    measured = drawn.line("f", "coherence", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "coherence_predicted", source=s["frf"], **theme.PREDICTED)
+    measured = drawn.line("f", "coherence", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "coherence_predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
     return drawn
 

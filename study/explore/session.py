@@ -62,7 +62,7 @@ class ByRecord:
     why_not: str = ""  # the sentence on a record to which the model alone cannot be fitted
 
 
-NONE = Several()
+NO_OTHERS = Several()
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Session:
     stages: tuple[Stage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
-    several: Several = NONE
+    several: Several = NO_OTHERS
 
     @property
     def now(self) -> Stage:
@@ -134,7 +134,7 @@ def begin(model: Model, prepared: Prepared, *, earlier: Sequence[Step] = ()) -> 
 
 
 def begin_with(
-    accounted: Accounted, *, earlier: Sequence[Step] = (), several: Several = NONE, known: ByRecord | None = None
+    accounted: Accounted, *, earlier: Sequence[Step] = (), several: Several = NO_OTHERS, known: ByRecord | None = None
 ) -> Session:
     """A session with the model as it was compared, on the record, or records, as corrected for that.
 

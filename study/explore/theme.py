@@ -20,8 +20,8 @@ from bokeh.plotting import figure
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
 INK, QUIET, RULE, AXIS = "#1f2933", "#5c6873", "#e4e7eb", "#9aa5b1"
 BLUE, ORANGE = "#0b5394", "#d1600a"
-MEASURED: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
-PREDICTED: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
+MEASURED_LINE: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
+PREDICTED_LINE: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
 DIFFERENCE: dict[str, Any] = {"line_color": ORANGE, "line_width": 1.0}
 NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}

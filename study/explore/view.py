@@ -24,7 +24,7 @@ from study.diagnose.ranked import Ranked
 from study.equations.coefficient_units import units_at
 from study.equations.place import HERE, Place
 from study.explore import axes, check_columns, decimate, place_words, record_words, words
-from study.explore.axis_scales import LEAST, Columns, Focus, heard, rms_force, within
+from study.explore.axis_scales import LEAST_FORCE, Columns, Focus, heard, rms_force, within
 from study.explore.check_columns import NINETY_FIVE
 from study.explore.page_units import in_text, power
 from study.explore.session import Session, Stage, on_record
@@ -130,7 +130,7 @@ class View:
         comparison, place = self.stage.comparison, self.places[label]
         focus = self.focus(self.sensors[0], label)
         u, v, missing = focus.within
-        least = LEAST * rms_force(comparison) / focus.force.factor
+        least = LEAST_FORCE * rms_force(comparison) / focus.force.factor
         stiffness = self.stiffnesses.get(place.path)
         largest = 1.0 if stiffness is None else float(np.max(np.abs(stiffness.model), initial=0.0))
         scale = power("/".join(units_at(place, comparison.record)), largest)

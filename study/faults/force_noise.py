@@ -30,7 +30,7 @@ LITTLE = 0.01  # of the force: the noise of the first runs, those that follow ha
 REPEATS = 5  # of the runs, until size and colour of the noise no longer change
 FADED = 0.1  # of a part of a record at either end
 INDEPENDENT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
-LINES = 5  # of a spectrum, over which the mean of these runs is taken
+LINES_IN_MEAN = 5  # of a spectrum of these runs
 SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 
 
@@ -136,7 +136,7 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
             total, count = total + found if count else found, count + 1
     if not count:
         return None
-    near, whole = np.ones(LINES), np.ones(len(total))
+    near, whole = np.ones(LINES_IN_MEAN), np.ones(len(total))
     beside = np.convolve(whole, near, "same")
     smooth = [np.convolve(own, near, "same") / beside for own in (total / count).T]
     # of a periodogram that scatters as a chi squared of two degrees of freedom

@@ -31,7 +31,7 @@ from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
 IMITATED = 1e-5  # share of a column's length that the model's own coefficients leave of it
-SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
+LONGEST_LOOK = 8192  # samples in which effects are searched for
 STRONGEST = 5  # effects, by their linear share, that are fitted
 AS_GOOD = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
@@ -354,7 +354,9 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
-    look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
+    look = prepared.shortened(
+        int(np.clip(prepared.samples_in(shape_search.SEARCH_PERIODS), shape_search.SEARCH_SAMPLES, LONGEST_LOOK))
+    )
     entries = candidate_entries(fit.model, turning=prepared.record.rotations)
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)

@@ -55,7 +55,7 @@ from study.records.prepared import Prepared, limited
 from study.support.errors import expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
-SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
+LEAST_COMPETING, MOST_COMPETING = 8192, 16384  # samples of either part in which faults compete with physics
 Asked = tuple[str, str]  # a fault and the channel in which it is looked for
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
@@ -63,7 +63,7 @@ EFFECTS = 3  # of the library that are added before a fault is believed
 STEPS = 8  # of Gauss and Newton
 OF_MOTION = 0.5  # of what is left: where so much depends on the motion, a force is missing rather than noisy
 FAR_APART = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
-NEAR = 0.05  # standard errors: as near the value as the search has to come
+REACHED = 0.05  # standard errors: as near the value as the search has to come
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def first_faults(prepared: Prepared, held: Mapping[Asked, float], asked: Sequenc
 
 def searched_part(given: Prepared) -> Prepared:
     """As much of either part of a record as a search for faults that compete with physics takes."""
-    return limited(given, int(np.clip(given.samples_in(shape_search.PERIODS), SHORT, LONG)))
+    return limited(given, int(np.clip(given.samples_in(shape_search.SEARCH_PERIODS), LEAST_COMPETING, MOST_COMPETING)))
 
 
 def search_faults(
@@ -425,7 +425,7 @@ def refined(
         if one is None:
             return None
         left = one.left
-        if abs(step) <= NEAR * error:
+        if abs(step) <= REACHED * error:
             break
     if left.relative_power >= before.relative_power:
         return None

@@ -26,7 +26,7 @@ WANDER = 1e-3  # share by which the mains' frequency wanders
 LINES_BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 DRIFTING = 12  # lines from zero that are drift, not hum
-NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
+SAMPLES_BESIDE = 8  # that tell how much a sample differs from its own two neighbours
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
@@ -230,7 +230,7 @@ def _isolated(residual: Floats, known: Bools, level: float) -> Bools:
     as spikes, for two may be neighbours.
     """
     found = np.zeros(len(residual), dtype=bool)
-    if len(residual) < 4 * NEIGHBOURS:
+    if len(residual) < 4 * SAMPLES_BESIDE:
         return found
     for _ in range(ROUNDS):
         usable = known & ~found
@@ -258,8 +258,8 @@ def _single(bend: Floats) -> Bools:
 
 def _spread(bend: Floats, whole: Bools) -> tuple[Floats, Floats]:
     """Standard deviation of the bends about each sample, the nearest two left out, and their number, shapes (n,)."""
-    kernel = np.ones(2 * NEIGHBOURS + 1)
-    kernel[NEIGHBOURS - 2 : NEIGHBOURS + 3] = 0.0
+    kernel = np.ones(2 * SAMPLES_BESIDE + 1)
+    kernel[SAMPLES_BESIDE - 2 : SAMPLES_BESIDE + 3] = 0.0
     middle = 1.4826 * float(np.median(np.abs(bend[whole]))) if np.any(whole) else 0.0
     near = np.clip(np.abs(bend), 0.0, 5.0 * middle) if middle > 0.0 else bend  # another spike nearby is no measure
     count = np.convolve(whole, kernel, "same")

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from study.compare import history
+from study.compare.campaign import MEASURED_RECORDS
 from study.diagnose.verdict import MISSING, NOTHING
 from study.support import document
 from study.support.config_files import TableRow, Text, read_rows
@@ -20,7 +21,6 @@ from study.support.errors import StudyError, expect
 from study.support.files import read_text
 from study.support.numbers import percent
 
-TITLE = "Measured records"
 PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "history.png": "every model of the climb and its held-out error",
     "climb/step_0/structure.png": "where a force is missing from the structure as given",
@@ -318,7 +318,7 @@ def _spoken(name: str) -> str:
 def gallery_page(shown: Sequence[Entry]) -> bytes:
     """Everything on one page, with thumbnails that open."""
     first = PageSection("all", "All of them", document.fragment([climb_overview(shown)]))
-    return document.picture_page(TITLE, [first, *(_section(entry) for entry in shown)])
+    return document.picture_page(MEASURED_RECORDS, [first, *(_section(entry) for entry in shown)])
 
 
 def climb_overview(shown: Sequence[Entry]) -> Block:

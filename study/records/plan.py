@@ -13,7 +13,6 @@ from study.support.thresholds import ENOUGH
 
 Span = tuple[int, int]
 SHORTEST_PART = 64  # samples
-MOST = 0.5  # of a part: channels that rest for longer do not move in it
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def _halves(record: Record, sensors: Sequence[Sensor]) -> tuple[Span, Span]:
 def _rests(values: Floats) -> bool:
     """Whether channels stay at one value for most of a part, from its beginning or to its end."""
     first, last = moving(values)
-    return last - first < (1.0 - MOST) * len(values)
+    return last - first < 0.5 * len(values)
 
 
 def driven_apart(record: Record, one: Span, other: Span) -> bool:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from study.records import MOTIONS
 from study.records.number_table import number_table
 from study.support.arrays import Floats
 from study.support.csv_text import csv_bytes
 from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
-MOTIONS = ("displacement", "velocity", "acceleration")
 OF_THE_GROUND = "base_acceleration"  # stands for a force where the base of a structure moves
 FORCE = "force"  # on a single mass; what is predicted where the motion is prescribed
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}

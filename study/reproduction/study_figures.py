@@ -257,7 +257,7 @@ PANELS_A_ROW = 4
 MARKERS = {"siso": ("x", False), "miso": ("s", True), "local_polynomial": ("^", True), "instrumental": ("D", False),
            "output_error": ("o", False)}  # fmt: skip
 LOWEST_ERROR, HIGHEST_ERROR = 1e-7, 1e3  # percent: what lies outside stands at the edge
-LEFT, TOP, ROW = 1.5, 1.15, 0.19  # inches
+INSET, TOP, ROW = 1.5, 1.15, 0.19  # inches
 
 
 def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
@@ -269,7 +269,7 @@ def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
     rows = -(-len(PANELS) // PANELS_A_ROW)
     width, height = 10.2, TOP + rows * (ROW * len(cases) + 0.35) + 0.5
     figure = Figure(figsize=(width, height))
-    figure.subplots_adjust(left=LEFT / width, right=0.985, top=1.0 - TOP / height, bottom=0.5 / height, wspace=0.08,
+    figure.subplots_adjust(left=INSET / width, right=0.985, top=1.0 - TOP / height, bottom=0.5 / height, wspace=0.08,
                            hspace=0.35 / (ROW * len(cases)))  # fmt: skip
     axes = list(figure.subplots(rows, PANELS_A_ROW, sharex=True, sharey=True, squeeze=False).flat)
     for panel, (title, parameters) in zip(axes, PANELS.items(), strict=True):
@@ -279,10 +279,10 @@ def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
         panel.set_xlabel("error (%)")
     seeds = int(table["seeds"].max())
     subtitle = f"median over {seeds} seeds of the relative error, with the median's standard error; less is to the left"
-    page.head(figure, "Errors of the estimators on the same records", subtitle, LEFT, 0.1)
+    page.head(figure, "Errors of the estimators on the same records", subtitle, INSET, 0.1)
     entries = page.legend_entries(axes)
     figure.legend(list(entries.values()), list(entries), loc="upper left", ncols=len(entries), borderaxespad=0.0,
-                  bbox_to_anchor=(LEFT / width, 1.0 - 0.58 / height), borderpad=0.0, handlelength=1.2)  # fmt: skip
+                  bbox_to_anchor=(INSET / width, 1.0 - 0.58 / height), borderpad=0.0, handlelength=1.2)  # fmt: skip
     return figure
 
 

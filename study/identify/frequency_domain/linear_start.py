@@ -24,7 +24,7 @@ from study.support.levenberg_marquardt import End, Point, minimise, point_at
 
 FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
 CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
-LINES = 300  # at most
+MOST_LINES = 300
 LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
 POOR = 0.01  # share of the responses' power: a search that leaves more has ended at a local minimum
 ROUNDS, TRIALS = 6, 40  # weighted solutions; runs of a search
@@ -82,7 +82,7 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
         raise StudyError(f"{said}: {floats}" if loose_motions(model) else said)
     noise = own * np.maximum(1.0 - coherence, LEAST_ERROR) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
-    thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]
+    thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // MOST_LINES)]
     return SensorResponses(omega[thin], response[thin], error[thin])
 
 

@@ -81,7 +81,7 @@ def _stack(values: Complexes, turn: Complexes, blocks: int) -> Complexes:
 
 BLOCK_ROWS, MOST_MODES = 24, 8  # of the subspace
 SPARE = 4  # poles that may be real beside those of the modes: of the record's ends, and of what no mode is
-LINES = 1200  # at most
+MOST_DRIVEN_LINES = 1200
 TRIALS = 60
 
 
@@ -140,7 +140,7 @@ def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
     driven = [np.flatnonzero(power > FAINT * strongest) for power in smooth]
     count = sum(map(len, driven))
     expect(count > 4 * BLOCK_ROWS, f"the forces of {prepared.record.name!r} drive {count} lines; expected more")
-    kept = [lines[:: max(1, count // LINES)] for lines in driven]
+    kept = [lines[:: max(1, count // MOST_DRIVEN_LINES)] for lines in driven]
     found = np.concatenate([lines[keep] for lines, keep in zip(spectra, kept, strict=True)])
     s = 2j * np.pi * np.concatenate([f[keep] for f, keep in zip(frequency, kept, strict=True)])
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale

@@ -29,7 +29,7 @@ from study.support.least_squares import least_squares, normal_inverse
 
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FEWEST_LINES = 4  # two more than mass, damping and stiffness need
-SHORT = 512  # samples below which coherence may be missing because the record is short
+LONG_ENOUGH = 512  # samples: below, coherence may be missing because the record is short
 PADDED = 4  # times as many lines as samples show, for the peak of a short decay
 FEWEST_WINDOWS = 3  # of a period each, from which a decay is read
 
@@ -71,15 +71,15 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
         return found
     if len(found.omega) >= FEWEST_LINES:
         return found
-    while len(part) >= SHORT and length < len(part) // 2:
+    while len(part) >= LONG_ENOUGH and length < len(part) // 2:
         length = min(2 * length, len(part) // 2)
         found, chance = _lines(part, response, length)
         if len(found.omega) > max(1.0, chance):  # two lines are four equations
             return found
-    if len(part) < SHORT:
+    if len(part) < LONG_ENOUGH:
         raise StudyError(
             f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
-            f"have in common; fit a longer part, {SHORT} samples or more"
+            f"have in common; fit a longer part, {LONG_ENOUGH} samples or more"
         )
     raise StudyError(
         f"force and {response} of {record.name!r} have nothing in common at any frequency; expected a response to this "

@@ -11,17 +11,17 @@ from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.shooting import ShootingSegments
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError
-from study.support.levenberg_marquardt import OFFSET
+from study.support.levenberg_marquardt import RELATIVE_OFFSET
 
 TRIALS = 6  # free runs for each set of segments
-NEAR = 0.01  # standard errors: how near a minimum an intermediate fit has to come
+NEAR = 0.01  # standard errors: how near a minimum an intermediate fit, or that of a search, has to come
 RARE = 1e-3  # probability that two segments of one motion are kept apart
 NEGLIGIBLE = 1e-3  # of the response's standard deviation: a residual that the integrator may have made
 
 
 def fit_segments(
     model: Model, segments: ShootingSegments, states: Floats, held: Collection[str], max_iterations: int,
-    continuity: float = 0.0, offset: float = OFFSET,
+    continuity: float = 0.0, offset: float = RELATIVE_OFFSET,
 ) -> FreeRunFit:  # fmt: skip
     """:func:`free_run_fit.fit_free_run` from these initial states of the segments."""
     return fit_free_run(

@@ -20,6 +20,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.start_of_changes import start_of_changes
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
+from study.identify.time_domain.continuation import NEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
@@ -53,7 +54,6 @@ TRIED = 15  # free runs of a fit that tries a start
 DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # resonances over it
 SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
 NEARBY_FACTORS = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
-NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
 
 def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> FreeRunFit:

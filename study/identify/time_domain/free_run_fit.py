@@ -21,7 +21,7 @@ from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Bools, Floats
 from study.support.errors import DivergenceError, StudyError
-from study.support.levenberg_marquardt import OFFSET, ContinuityGaps, End, Point, minimise, point_at
+from study.support.levenberg_marquardt import RELATIVE_OFFSET, ContinuityGaps, End, Point, minimise, point_at
 
 FARTHEST = 1e9  # times its start: a mass that the motion does not show at all runs off without end
 
@@ -147,7 +147,7 @@ def fit_free_run(
     max_iterations: int = 60,
     initial: str | Floats = "estimate",
     continuity: float = 0.0,
-    offset: float = OFFSET,
+    offset: float = RELATIVE_OFFSET,
     noise: tuple[Floats, ...] = (),
     lost: Bools | None = None,
     penalty: Floats | None = None,

@@ -15,7 +15,7 @@ from study.records.record import ALONE, Sensor
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
-from study.support.levenberg_marquardt import OFFSET
+from study.support.levenberg_marquardt import RELATIVE_OFFSET
 from study.support.statistics import clustered_covariance
 
 BEYOND_MEASURE = 1e150
@@ -36,7 +36,7 @@ def fit_part(
     steps: int = STEPS,
     max_iterations: int = 60,
     initial: Floats | None = None,
-    offset: float = OFFSET,
+    offset: float = RELATIVE_OFFSET,
     noise: tuple[Floats, ...] = (),
     penalty: Floats | None = None,
 ) -> FreeRunFit:

@@ -21,9 +21,9 @@ from study.support.errors import DivergenceError, StudyError
 PERIODS, STRETCH_LIMITS = 50.0, (512, 2048)  # of motion, and samples, in the stretch where multiple shooting begins
 SHIFT = 0.3  # standard errors by which the integration may shift a coefficient ...
 SMALL_SHIFT = 0.05  # ... and where samples were left out: leaving them out is to shift nothing
-ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
+INTEGRATOR_ORDER = 4  # what it shifts falls with this power of the steps
 LARGEST_EXCESS = 1e6  # times the shift that would matter: more asks for no more steps than this
-MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
+MOST_FIT_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
 LOST = 0.5  # of what one free run leaves: where segments leave less, that run has lost the motion
 KEPT = 40  # free runs of a fit that is kept
 
@@ -106,7 +106,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     Held ones count too, with the errors that they would have: what the integration does to them is left of the motion.
     Segments are found anew with the steps that they need: the integration's error parts them as a wrong model does.
     """
-    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
+    most = max(MOST_FIT_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
     allowed = SHIFT if prepared.every == 1 else SMALL_SHIFT
     while fit.steps_per_sample < most:
         whole = released(fit)
@@ -117,7 +117,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
             excess = float(np.max(np.abs(moved) / np.maximum(allowed * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:
             break
-        times = 2 ** max(1, math.ceil(math.log2(min(excess, LARGEST_EXCESS)) / ORDER))
+        times = 2 ** max(1, math.ceil(math.log2(min(excess, LARGEST_EXCESS)) / INTEGRATOR_ORDER))
         steps = min(times * fit.steps_per_sample, most)
         if fit.restarts:
             try:

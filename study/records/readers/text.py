@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from study.records.number_table import number_table
-from study.records.readers.table import NONE, Column, Table, split_unit
+from study.records.readers.table import NO_VALUES, Column, Table, split_unit
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
@@ -238,7 +238,7 @@ def _checked(name: str, unit: str, cells: Sequence[str], decimal: str, place: Pl
     wrong = next((i for i, cell in enumerate(cells) if cell and not _is_number(cell, decimal)), None)
     if wrong is not None:
         fault = f"column {name!r} holds {excerpt(cells[wrong], 30)!r} in {place(wrong)}; expected a number"
-        return Column(name, NONE, unit, fault=fault)
+        return Column(name, NO_VALUES, unit, fault=fault)
     numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in cells)
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
 
