@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
 def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -> "Session":
     """The session with the model as given, on one record or fitted to several together and to each by itself."""
-    from study.compare.comparison import STEPS
+    from study.compare.comparison import REPORTS
     from study.explore import session as sessions
     from study.explore.session import Several, by_record, of_own
     from study.faults.accounting import Accounted
@@ -59,7 +59,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate
-    with progress("step", STEPS * (1 + len(records) * many)) as step:
+    with progress("step", REPORTS * (1 + len(records) * many)) as step:
         found = accounted_together(arguments, together, marked, arguments.records[0], progress=step)
         own: list[Accounted] = []
         for record, path in zip(records, sources(arguments), strict=True) if many else ():

@@ -18,7 +18,7 @@ from study.support.thresholds import ALPHA, TOLERANCE
 
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
-SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
+SURE_POWER = 0.4  # standard error of a power, at most, for it to be called by a whole number
 HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
 POWER_NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
@@ -165,7 +165,7 @@ def _whole(way: Growth) -> int | None:
     nearest = round(way.power)
     # a power is called by a whole number as near as this
     near = abs(way.power - nearest) <= max(0.25, TOLD_APART * way.power_error)
-    return nearest if near and way.power_error <= SURE and nearest in (0, 1, *POWER_NAMES) else None
+    return nearest if near and way.power_error <= SURE_POWER and nearest in (0, 1, *POWER_NAMES) else None
 
 
 def _power(way: Growth, whole: int | None) -> str:

@@ -30,7 +30,7 @@ from study.support.errors import DivergenceError
 WINDOW = 6.0  # periods over which a frequency is taken
 PASS_BAND = (0.5, 1.6)  # of the frequency: what lies outside is offset, drift and overtones
 ENDS = 2.0  # periods at each end where the analytic signal knows too little
-QUIET = 4.0  # amplitude over the noise floor's rms below which nothing is read
+OVER_FLOOR = 4.0  # amplitude over the noise floor's rms: below, nothing is read
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def decays(fit: FreeRunFit, prepared: Prepared, floor: float, number: int = 0) -
     response = str(prepared.outputs.sensors[number])
     omega, _ = frequency_and_rate(prepared.record.part(*prepared.plan.fit), response)
     wholes = _whole_stretches(prepared.record)
-    least = QUIET * floor
+    least = OVER_FLOOR * floor
     measured = [_decay(s.source[response][s.first : s.last], prepared.dt, omega, least) for s in wholes]
     predicted: Decay | None = None
     if not fit.model.modal:  # no sensor shows the state of a mode

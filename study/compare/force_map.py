@@ -10,7 +10,7 @@ from study.support.arrays import Floats
 CELLS = (21, 15, 11, 7)  # along each axis of the map, from the finest
 CLASSES = 24  # of a curve
 FEWEST_VISITS = 8  # for a mean with an error
-REACH = 0.001  # quantile at each end where map and curves end
+END_QUANTILE = 0.001  # where map and curves end, on each side
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def _entered(place: NDArray[np.int64], inside: NDArray[np.bool_]) -> NDArray[np.
 
 def edges(values: Floats, classes: int) -> Floats:
     """Edges of classes of equal width, shape (classes + 1,), from which a few extreme samples stand out."""
-    low, high = (float(q) for q in np.quantile(values, [REACH, 1.0 - REACH]))
+    low, high = (float(q) for q in np.quantile(values, [END_QUANTILE, 1.0 - END_QUANTILE]))
     return np.linspace(low, high, classes + 1)
 
 

@@ -21,7 +21,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
-RUNS = 15  # free runs of a fit that asks what a model would be without a term
+RUNS_WITHOUT = 15  # a term: free runs of a fit that asks what a model would be
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def fitted_without(fit: FreeRunFit, name: str, prepared: Prepared, start: dict[s
     for begin in _starts(model, prepared, start, held):
         try:
             yield fit_part(
-                model, prepared, held, begin, steps=fit.steps_per_sample, max_iterations=RUNS, initial=states,
+                model, prepared, held, begin, steps=fit.steps_per_sample, max_iterations=RUNS_WITHOUT, initial=states,
                 offset=NEAR, noise=fit.noise,
             )  # fmt: skip
         except StudyError:

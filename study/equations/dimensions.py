@@ -10,7 +10,7 @@ Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
 DIMENSIONLESS: Dimensions = (Fraction(0), Fraction(0))
 MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration, the shape whose coefficient is a mass
 OF_NUMBERS = ("sin", "cos", "tan", "exp", "log", "tanh")  # functions of a number alone
-VARIABLES: dict[str, Dimensions] = {
+VARIABLE_DIMENSIONS: dict[str, Dimensions] = {
     "u": (Fraction(1), Fraction(0)),
     "v": (Fraction(1), Fraction(-1)),
     "t": (Fraction(0), Fraction(1)),
@@ -19,7 +19,7 @@ VARIABLES: dict[str, Dimensions] = {
 
 def dimensions(text: str, known: dict[str, Dimensions]) -> Dimensions | None:
     """Powers of length and time of a formula; None where its parts do not share them."""
-    return _dimensions(formulas.parse(text), VARIABLES | known)
+    return _dimensions(formulas.parse(text), VARIABLE_DIMENSIONS | known)
 
 
 def agrees(text: str, known: dict[str, Dimensions], *, angle: bool = False) -> bool:
@@ -29,7 +29,7 @@ def agrees(text: str, known: dict[str, Dimensions], *, angle: bool = False) -> b
     """
     calls = (node for node in ast.walk(formulas.parse(text)) if isinstance(node, ast.Call))
     plain = (call for call in calls if isinstance(call.func, ast.Name) and call.func.id in OF_NUMBERS)
-    found = [_dimensions(call.args[0], VARIABLES | known) for call in plain]
+    found = [_dimensions(call.args[0], VARIABLE_DIMENSIONS | known) for call in plain]
     return dimensions(text, known) is not None and all(d == DIMENSIONLESS or (angle and d is not None) for d in found)
 
 

@@ -14,7 +14,7 @@ from study.support.arrays import Floats
 
 POINTS, FEWEST_FINITE = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
 NO_FORCE = 1e-150  # what is below counts as zero
-SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
+UNACCOUNTED = 1e-10  # share of a formula that others leave, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 
 
@@ -108,4 +108,4 @@ def _shares(wanted: Floats, others: Floats) -> Floats | None:
     parts = amounts * others / size
     left = float(np.linalg.norm(wanted - np.sum(parts, axis=1)))
     largest = float(np.max(np.abs(wanted)))
-    return np.max(np.abs(parts), axis=0) / largest if left < SAME * float(np.linalg.norm(wanted)) else None
+    return np.max(np.abs(parts), axis=0) / largest if left < UNACCOUNTED * float(np.linalg.norm(wanted)) else None

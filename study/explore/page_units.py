@@ -13,7 +13,7 @@ EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of
 EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
 LONG_NUMBER = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
 KNOWN = 1e4  # times its error: a value that is larger
-PLAIN = (-3, 5)  # powers of ten from which on, and up to which, no power is written
+PLAIN_POWERS = (-3, 5)  # of ten: from the first on, and below the last, none is written
 NO_BREAK = "\u00a0"
 RAISED = str.maketrans("0123456789-/.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ·")
 
@@ -78,7 +78,7 @@ def with_error(value: float, half: float) -> tuple[str, str]:
     if largest > KNOWN * half:
         return number(value, 6), number(half, 2)
     power = math.floor(math.log10(largest))
-    power = power if power >= PLAIN[1] or power < PLAIN[0] else 0
+    power = power if power >= PLAIN_POWERS[1] or power < PLAIN_POWERS[0] else 0
     last = math.floor(math.log10(half)) - 1 - power  # the decimal of the error's second digit
     shown = (f"{round(x / 10.0**power, -last) + 0.0:.{max(0, -last)}f}" for x in (value, half))
     behind = f"·10{str(power).translate(RAISED)}" if power else ""

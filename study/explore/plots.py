@@ -169,7 +169,7 @@ def plane(s: Sources) -> Any:
     drawn.add_glyph(s["plane"], outline, nonselection_glyph=None)
     bar = ColorBar(
         color_mapper=mapper, name="plane_bar", width=9, padding=4, background_fill_color=None,
-        major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.QUIET,
+        major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.GREY,
         label_standoff=4, bar_line_color=None, formatter=CustomJSTickFormatter(code=theme.EVEN),
     )  # fmt: skip
     drawn.add_layout(bar, "right")

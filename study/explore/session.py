@@ -40,7 +40,7 @@ from study.support.errors import StudyError, expect
 from study.support.extras import undrawn
 
 Step = dict[str, Any]
-SHOWN = 12  # candidates
+ON_THE_PAGE = 12  # candidates
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Stage:
         """What a page lists: sets of effects, the best single ones, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
         sets = [r for r in self.diagnosis.sets if len(r.entries) > 1] if self.diagnosis is not None else []
-        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if is_own(r.term)))
+        return (*sets[:ON_THE_PAGE], *rows[:ON_THE_PAGE], *(r for r in rows[ON_THE_PAGE:] if is_own(r.term)))
 
     @property
     def values(self) -> dict[str, float]:

@@ -36,7 +36,7 @@ from study.support.arrays import Floats
 DASH = 5.0  # pixels
 DASHES = ("solid", "dashed", "dotdash", "dotted", "dashdot")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#333333", "#E69F00")
-SURE = 2.0  # standard errors: cells whose mean is below may be noise
+SURE_CELL = 2.0  # standard errors: cells whose mean is below may be noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +327,7 @@ def _plane(focus: Focus) -> Columns:
         "found": mean,  # which stays when a candidate is previewed
         "below": np.where(missing < -tiny, DASH, 0.0),
         "seen": np.where(np.isfinite(mean), 1.0, 0.0),
-        "unsure": np.where(np.abs(missing) < SURE * plane.error.ravel(), 3.0, 0.0),
+        "unsure": np.where(np.abs(missing) < SURE_CELL * plane.error.ravel(), 3.0, 0.0),
         "picked": np.zeros(len(mean)),
     }  # fmt: skip
 

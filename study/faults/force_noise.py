@@ -23,9 +23,9 @@ from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
-ROUNDS = 100  # of Fisher's scoring, at most
+SCORING_ROUNDS = 100  # Fisher's, at most
 HALVINGS = 14  # of one step, at most
-RUNS = 32  # of the model with noise on its force
+NOISY_RUNS = 32  # of the model, with noise on its force
 LITTLE = 0.01  # of the force: the noise of the first runs, those that follow have what was found
 REPEATS = 5  # of the runs, until size and colour of the noise no longer change
 FADED = 0.1  # of a part of a record at either end
@@ -127,7 +127,7 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
         return None
 
     drawn = list[Mapping[str, Any]]()  # where the numbers of each run begin: all of them would fill the memory
-    for _ in range(RUNS):
+    for _ in range(NOISY_RUNS):
         drawn.append(rng.bit_generator.state)
         rng.standard_normal(len(record))
     total, count = np.zeros(0), 0
@@ -169,7 +169,7 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
     columns, spectra = np.column_stack([shape.T.ravel() / level, own]), power.T.ravel()
     amounts = 0.5 * np.concatenate([[np.mean(mean)], mean])
     cost = _cost(columns @ amounts, spectra)
-    for _ in range(ROUNDS):
+    for _ in range(SCORING_ROUNDS):
         expected = columns @ amounts
         step = least_squares(columns / expected[:, None], spectra / expected) - amounts
         tried = [np.maximum(amounts + step / 2**k, SHRINKING * amounts) for k in range(HALVINGS)]

@@ -34,7 +34,7 @@ IMITATED = 1e-5  # share of a column's length that the model's own coefficients 
 LONGEST_LOOK = 8192  # samples in which effects are searched for
 STRONGEST = 5  # effects, by their linear share, that are fitted
 AS_GOOD = 2.0  # standard errors by which one effect may leave more than another and be as good
-RUNS = 20  # free runs of such a fit
+FIT_RUNS = 20  # free runs of the fit of such an effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,7 +369,12 @@ def missing(left: FittedResidual) -> FittedResidual | None:
             near = with_term(base, *begun)
             initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
             fit = fit_part(
-                near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
+                near.model,
+                prepared,
+                base.fit.held,
+                steps=near.steps_per_sample,
+                max_iterations=FIT_RUNS,
+                initial=initial,
             )
         except StudyError:
             return None

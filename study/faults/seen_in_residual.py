@@ -27,7 +27,7 @@ LINES_BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 DRIFTING = 12  # lines from zero that are drift, not hum
 SAMPLES_BESIDE = 8  # that tell how much a sample differs from its own two neighbours
-ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
+SPIKE_ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
 def drift(left: SensorResidual, asked: int) -> Fault | None:
@@ -232,7 +232,7 @@ def _isolated(residual: Floats, known: Bools, level: float) -> Bools:
     found = np.zeros(len(residual), dtype=bool)
     if len(residual) < 4 * SAMPLES_BESIDE:
         return found
-    for _ in range(ROUNDS):
+    for _ in range(SPIKE_ROUNDS):
         usable = known & ~found
         whole = usable & np.roll(usable, 1) & np.roll(usable, -1)
         whole[[0, -1]] = False

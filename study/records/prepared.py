@@ -12,7 +12,7 @@ from study.records.plan import SHORTEST_PART, Plan, compared_sensors, make_plan
 from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Bools, Floats
 
-QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
+PICTURED = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ def limited(prepared: Prepared, samples: int) -> Prepared:
     if last - first <= samples:
         return shorter
     meeting = replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
-    if shorter is prepared or _shown(meeting, prepared) > QUIET:
+    if shorter is prepared or _shown(meeting, prepared) > PICTURED:
         return meeting
     begin, length = prepared.plan.fit[0], min(prepared.plan.fit[1] - prepared.plan.fit[0], last - first)
     moved = [

@@ -31,7 +31,7 @@ from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
-PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly that of its neighbours (docs/tool.md)
+BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours (docs/tool.md)
 BLOCKS_OF_STRETCH = 24  # at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
@@ -270,7 +270,7 @@ def alternating(
     """
     fit, judge = list[Stretch](), list[Stretch]()
     for number, stretch in enumerate(stretches):
-        most = int(len(stretch) / max((anew or PERIODS) * period_of(stretch, sensors), SHORTEST_PART))
+        most = int(len(stretch) / max((anew or BLOCK_PERIODS) * period_of(stretch, sensors), SHORTEST_PART))
         for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS_OF_STRETCH)))):
             block = replace(block, continues=place > 1 and not anew)  # the motion runs on through the blocks between
             (fit if (number + place) % 2 == 0 else judge).append(block)
@@ -411,7 +411,7 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
     whole = _begun_anew(prepared, stretches)
     yield whole
     joined = Stretch(prepared.record, 0, len(prepared.record))
-    samples = PERIODS * period_of(joined, prepared.sensors)
+    samples = BLOCK_PERIODS * period_of(joined, prepared.sensors)
     pieces = [p for s in stretches for p in cut(s, max(round(len(s) / max(samples, SHORTEST_PART)), 1))]
     if len(pieces) > len(stretches):
         yield replace(_begun_anew(prepared, pieces), running_on=whole)

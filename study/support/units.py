@@ -47,7 +47,7 @@ BASES: dict[str, tuple[float, Powers]] = {
 }  # fmt: skip
 PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 PREFIXED = ("N", "m", "s", "V", "A", "g", "gn", "rad")
-PLAIN = str.maketrans({
+PLAIN_CHARACTERS = str.maketrans({
     "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
     "°": "deg",
 })  # fmt: skip
@@ -72,7 +72,7 @@ class Unit:
 
 def parse_unit(text: str) -> Unit:
     """Understand a unit; of what is none, a ``StudyError`` names some that are."""
-    plain = text.strip().replace("**", "^").translate(PLAIN).replace("^-^", "^-")
+    plain = text.strip().replace("**", "^").translate(PLAIN_CHARACTERS).replace("^-^", "^-")
     plain = re.sub(r"\s*([/^])\s*", r"\1", " ".join(plain.replace("(", " ").replace(")", " ").split()))
     factor, powers = 1.0, Powers()
     for position, group in enumerate(plain.split("/")):

@@ -341,7 +341,7 @@ def test_the_measured_response_function_is_that_of_the_linear_system_within_its_
 def test_the_users_own_candidate_is_shown_whatever_its_rank(found, monkeypatch):
     from study.diagnose import diagnosis_report
 
-    monkeypatch.setattr(diagnosis_report, "SHOWN", 1)
+    monkeypatch.setattr(diagnosis_report, "ON_SCREEN", 1)
     rank = 1 + [c.name for c in found.candidates].index("bushing")
     assert rank > 1
     lines = found.table().splitlines()

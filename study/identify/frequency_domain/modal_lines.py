@@ -80,9 +80,9 @@ def _stack(values: Complexes, turn: Complexes, blocks: int) -> Complexes:
 
 
 BLOCK_ROWS, MOST_MODES = 24, 8  # of the subspace
-SPARE = 4  # poles that may be real beside those of the modes: of the record's ends, and of what no mode is
+REAL_POLES = 4  # beside those of the modes, at most: of the record's ends, and of what no mode is
 MOST_DRIVEN_LINES = 1200
-TRIALS = 60
+MODAL_TRIALS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +272,9 @@ def line_fits(model: Model, prepared: Prepared, most: int = MOST_MODES) -> Itera
     for modes in range(1, most + 1):
         modal = ModalPart(points).of(modes)
         problem = _Modal(lines, modal, at, drives, ways, np.pi / prepared.dt)
-        starts = (_searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + SPARE + 1))
+        starts = (
+            _searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + REAL_POLES + 1)
+        )
         found = next((point for point in starts if point is not None), None)
         if found is not None:
             left = float(found.residual @ found.residual) / power
@@ -304,7 +306,7 @@ def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:
     if point is None:
         return None
     size = float(np.linalg.norm(problem.lines.outputs))
-    return minimise(problem.point, point, size, TRIALS, 1e-2).point
+    return minimise(problem.point, point, size, MODAL_TRIALS, 1e-2).point
 
 
 def _named(model: Model, modal: ModalPart, parts: tuple[Floats, Floats, Floats, Floats]) -> Model:

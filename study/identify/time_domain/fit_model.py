@@ -52,7 +52,7 @@ from study.support.errors import DivergenceError, StudyError, expect
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
 DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # resonances over it
-SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
+SAME_MINIMUM = 1e-6  # of a mass: two searches for it end as near without noise
 NEARBY_FACTORS = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 
 
@@ -142,7 +142,7 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     place = fit.keys.index("m")
     own, other = (f.model.numbers()["m"] for f in (fit, again))
     known = np.sqrt([covariance_of(f, linearise(f, prepared))[place, place] for f in (fit, again)])
-    return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME * own
+    return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME_MINIMUM * own
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:

@@ -19,12 +19,12 @@ from study.support.levenberg_marquardt import RELATIVE_OFFSET
 from study.support.statistics import clustered_covariance
 
 BEYOND_MEASURE = 1e150
-STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
+SEARCH_STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 
 
 def rough_steps(model: Model, prepared: Prepared, start: Mapping[str, float]) -> int:
     """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
+    return max(SEARCH_STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
 
 def fit_part(
@@ -33,7 +33,7 @@ def fit_part(
     held: Collection[str],
     start: Mapping[str, float] | None = None,
     *,
-    steps: int = STEPS,
+    steps: int = SEARCH_STEPS,
     max_iterations: int = 60,
     initial: Floats | None = None,
     offset: float = RELATIVE_OFFSET,

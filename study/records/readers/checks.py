@@ -20,7 +20,7 @@ CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
 FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
 JITTER = 0.01  # of the sampling interval: what is uneven by less is even, and what is off by less is the same
-ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed times that still shows a lost sample
+COARSEST_ROUNDING = 0.4  # of the sampling interval: of printed times that still show a lost sample
 CONTENT = 1e-6  # of its maximum: autospectra below are leakage
 COHERENT = 0.3  # lines less coherent than this say little
 FEWEST_COHERENT = 8  # lines
@@ -119,7 +119,7 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
     grid = np.arange(len(time), dtype=np.float64)
     away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
     rounding = _rounding(time)
-    if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
+    if away > max(JITTER * mean, min(rounding, COARSEST_ROUNDING * mean)):
         usual, widest = float(np.median(steps)), int(np.argmax(steps))
         worst = int(np.argmax(np.abs(steps - usual)))
         how = f"sampling is uneven ({usual:.6g} s usually, {steps[worst]:.6g} s before {place(worst + 1)})"

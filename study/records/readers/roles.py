@@ -30,7 +30,7 @@ NAMES_OF_ROLES: dict[str, tuple[str, ...]] = {
 }
 
 
-SEPARATOR = re.compile(r"[ ._:/-]+")
+ROLE_SEPARATOR = re.compile(r"[ ._:/-]+")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Roles:
                 return channel
         for coordinate in self.coordinates:
             rest = low.removeprefix(coordinate.lower())
-            motion = _plain_role(rest) if SEPARATOR.match(rest) else "" if rest else kind
+            motion = _plain_role(rest) if ROLE_SEPARATOR.match(rest) else "" if rest else kind
             if low != rest and (not rest or motion in MOTIONS):
                 return str(Sensor(coordinate, motion if motion in MOTIONS else MOTIONS[0]))
         return self.plain.get(low, "")

@@ -45,7 +45,7 @@ from study.reproduction.chapters.chapter import (
     judges,
 )
 from study.reproduction.claims.judgement import Condition, explained
-from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.reported import COEFFICIENTS, Reported
 from study.reproduction.ensemble import NOISE_OFFSET
 from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.document import Block, Text, table
@@ -53,7 +53,6 @@ from study.support.numbers import percent
 
 BY_LEAST_SQUARES, ON_A_FREE_RUN = ("siso", "miso"), ("instrumental", "output_error")
 PERIODIC = "errors_in_variables"
-COEFFICIENTS = ("m", "c", "k", "k3", "c3")
 RANDOM, PERIODIC_FORCE = "random", "repeated"  # forces
 CELL = ["force", "force_noise", "displacement_noise"]
 BY_ESTIMATE = [*CELL, "estimator", "parameter"]
