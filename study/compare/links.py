@@ -18,7 +18,7 @@ from study.records.spectra import Segments
 from study.support.arrays import Floats
 from study.support.statistics import IN_A_BLOCK
 
-LINK_BLOCKS = 64  # at most
+LINK_BLOCKS = 64  # of time, at most
 
 
 @dataclass(frozen=True)

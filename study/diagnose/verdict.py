@@ -38,7 +38,7 @@ from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNS
 
 MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
 NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
-LONGEST_SEARCH = 16384  # samples: it uses half of the fitting part if that is more than the least, up to these
+LONGEST_SEARCH = 16384  # samples: a search uses half of the fitting part if that is more than the least, up to so many
 NAMED_FIRST = 0.5  # of what is unexplained: an effect of a component, or of a decay, that explains it is named first
 RIVALS = 12  # sets near the best that are compared with it in every detail
 

@@ -23,14 +23,14 @@ from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
-SCORING_ROUNDS = 100  # Fisher's, at most
+SCORING_ROUNDS = 100  # of Fisher's, at most
 HALVINGS = 14  # of one step, at most
 NOISY_RUNS = 32  # of the model, with noise on its force
 LITTLE = 0.01  # of the force: the noise of the first runs, those that follow have what was found
 REPEATS = 5  # of the runs, until size and colour of the noise no longer change
 FADED = 0.1  # of a part of a record at either end
 INDEPENDENT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
-LINES_IN_MEAN = 5  # of a spectrum of these runs
+LINES_IN_MEAN = 5  # of a spectrum, over which the mean of these runs is taken
 SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 
 

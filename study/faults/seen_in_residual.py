@@ -26,7 +26,7 @@ WANDER = 1e-3  # share by which the mains' frequency wanders
 LINES_BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 DRIFTING = 12  # lines from zero that are drift, not hum
-SAMPLES_BESIDE = 8  # that tell how much a sample differs from its own two neighbours
+SAMPLES_BESIDE = 8  # on either side, that tell how much a sample differs from its own two neighbours
 SPIKE_ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 

@@ -21,7 +21,7 @@ from study.support.units import A_VOLTAGE, ROLES, parse_unit, role_unit
 
 CONTINUED = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
-UNCERTAIN_PERIODS = 2.0  # of the cut-off frequency at each end of an integrated channel
+UNCERTAIN_PERIODS = 2.0  # of the cut-off frequency, at each end of an integrated channel
 NEAR_END = 8  # samples at each end where a derivative, or a filter, depends on the continuation
 
 

@@ -15,7 +15,7 @@ from study.support.errors import StudyError
 
 SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
 CLEAR = 3.0  # standard errors by which a line must stand above the noise, to be used
-AVERAGED = 5  # lines
+AVERAGED = 5  # lines that are
 BANDS = 20  # bands of the spectrum, or as many as there are lines
 FEWEST_NOISE_LINES = 8  # to show a noise floor
 QUIETEST_BANDS = 5  # that give the floor

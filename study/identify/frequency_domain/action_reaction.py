@@ -16,10 +16,10 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.reverse_system import ReverseSystem
 from study.support.arrays import Floats
 from study.support.errors import StudyError
+from study.support.least_squares import DISTINCT
 from study.support.levenberg_marquardt import Point, minimise, point_at
 
 MOST_TRIALS = 60  # of the search
-DISTINCT = 1e-9  # singular values below this share of the largest: the equations do not tell
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ MOST_LINES = 300
 LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
 LOCAL_MINIMUM = 0.01  # share of the responses' power: a search that leaves more has ended at one
 WEIGHTED_SOLUTIONS, SEARCH_RUNS = 6, 40
-DRAWN, STARTED, BATCH = 200, 40, 10  # structures drawn; those that start a search; so many at a time
+DRAWN, STARTED, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
 
 
 @dataclass(frozen=True, eq=False)

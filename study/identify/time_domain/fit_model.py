@@ -51,7 +51,8 @@ from study.support.errors import DivergenceError, StudyError, expect
 
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
-DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # resonances over it
+# Of a motion at one frequency: resonances to begin at, over that frequency.
+DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)
 SAME_MINIMUM = 1e-6  # of a mass: two searches for it end as near without noise
 NEARBY_FACTORS = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 
