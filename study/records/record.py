@@ -67,7 +67,7 @@ class Record:
     period: int | None = None  # samples in one period, where the excitation is periodic
     stretches: tuple[Stretch, ...] = ()  # what it is strung together of; empty for a record of its own
     changed: frozenset[str] = frozenset()  # channels that are no longer those of its stretches
-    between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.READINGS``
+    between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.BETWEEN_SAMPLES``
     coordinates: tuple[str, ...] = (ALONE,)  # whose motions its channels may be
     forces: tuple[str, ...] = ("force",)  # which channels are forces
     remarks: tuple[str, ...] = ()  # what its reader noticed, a sentence each: units that nobody gave, rest, junk
