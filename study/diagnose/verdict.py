@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
-from study.diagnose import candidates, set_search, varying_candidates
+from study.diagnose import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, candidates, set_search, varying_candidates
 from study.diagnose.candidates import FittedCandidate, Progress, unknowns_of, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -36,8 +36,6 @@ from study.support import statistics
 from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
-MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
-NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
 LONGEST_SEARCH = 16384  # samples: a search uses half of the fitting part if that is more than the least, up to so many
 NAMED_FIRST = 0.5  # of what is unexplained: an effect of a component, or of a decay, that explains it is named first
 RIVALS = 12  # sets near the best that are compared with it in every detail

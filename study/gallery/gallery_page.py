@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from study.compare import history
-from study.compare.campaign import MEASURED_RECORDS
-from study.diagnose.verdict import MISSING, NOTHING
+from study.diagnose import MISSING, NOTHING
 from study.support import document
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
@@ -318,7 +317,7 @@ def _spoken(name: str) -> str:
 def gallery_page(shown: Sequence[Entry]) -> bytes:
     """Everything on one page, with thumbnails that open."""
     first = PageSection("all", "All of them", document.fragment([climb_overview(shown)]))
-    return document.picture_page(MEASURED_RECORDS, [first, *(_section(entry) for entry in shown)])
+    return document.picture_page("Measured records", [first, *(_section(entry) for entry in shown)])
 
 
 def climb_overview(shown: Sequence[Entry]) -> Block:
