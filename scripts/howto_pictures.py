@@ -24,7 +24,7 @@ from study.equations.model_file import read_model
 from study.equations.simulate import simulate
 from study.figures import page
 from study.figures.styles import in_style
-from study.interface.showing import ABOVE
+from study.interface.showing import LEGEND_ABOVE
 from study.records.excitation import Excitation, force
 from study.support.arrays import Floats
 from study.support.errors import StudyError
@@ -107,7 +107,7 @@ def exported(axes: Axes, fit: st.Fit) -> None:
         )
         axes.plot(motion.t, 1e3 * motion.y[0], linestyle=dash, label=label)
     axes.set(xlabel="time (s)", ylabel="displacement (mm)")
-    axes.legend(**ABOVE)
+    axes.legend(**LEGEND_ABOVE)
 
 
 def campaign(path: Path, picture: Path) -> None:

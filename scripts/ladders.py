@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from study.commands.ladder import COLUMNS, Ladder, climbed_ladder, missing_ladder
+from study.commands.ladder import LADDER_COLUMNS, Ladder, climbed_ladder, missing_ladder
 from study.commands.measurements import Measurement
 from study.reproduction import tables
 from study.support.workflow_step import one_sentence
@@ -18,7 +18,7 @@ def main(rows: dict[str, Measurement], ladders: dict[str, Ladder], titles: dict[
         for name, ladder in ladders.items()
     ]
     rows_of_all = [row for table in made for row in table.to_dict("records")]
-    tables.write_table(pd.DataFrame(rows_of_all, columns=COLUMNS), output)
+    tables.write_table(pd.DataFrame(rows_of_all, columns=LADDER_COLUMNS), output)
 
 
 if "snakemake" in globals():

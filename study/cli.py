@@ -13,8 +13,7 @@ from study.support.errors import StudyError, expect
 from study.support.extras import lacked
 from study.support.terminal import harmless, shown_on
 
-LONG = re.compile(r"\S{400,}")  # a word that no path and no value needs: a message is to be read
-KEPT = (50_000, 20, 50)  # what modules make while they load lives to the end: a search for garbage finds none there
+LONG_WORD = re.compile(r"\S{400,}")  # that no path and no value needs: a message is to be read
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
 
@@ -59,7 +58,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> None:
     if argv is None:
-        gc.set_threshold(*KEPT)
+        # what modules make while they load lives to the end: a search for garbage finds none there
+        gc.set_threshold(50_000, 20, 50)
     words = sys.argv[1:] if argv is None else argv
     for word in words:  # a shell cannot pass one on, a caller in Python can
         expect("\0" not in word, f"the word {word!r} holds a null byte; expected words without")
@@ -89,7 +89,7 @@ def _flush() -> None:
 def _end(code: int, message: str = "") -> int:
     """Say the message in one line on stderr, and leave nothing for the interpreter's own flush to complain of."""
     if message:
-        line = LONG.sub(lambda word: f"{word[0][:150]}...{word[0][-20:]}", " ".join(message.split()))
+        line = LONG_WORD.sub(lambda word: f"{word[0][:150]}...{word[0][-20:]}", " ".join(message.split()))
         with suppress(OSError):
             print("study:", harmless(line), file=sys.stderr)
     try:

@@ -18,7 +18,7 @@ from study.commands.record_arguments import (
 if TYPE_CHECKING:
     from study.equations.model import Model
 
-PAGE = "campaign.html"
+CAMPAIGN_PAGE = "campaign.html"
 SOURCE = "made_from.json"
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 
@@ -70,10 +70,10 @@ def _run(arguments: argparse.Namespace) -> None:
             found.append(Measured(path.stem, model.name, comparison, diagnosis))
     expect(found, f"{arguments.folder}: no record could be used; the first: {next(iter(refused.values()), '')}")
     blocks = campaign_blocks(found, arguments.by, refused)
-    write_files(out, {PAGE: document_page(f"{model.name}: {len(found)} records", blocks).encode()})
+    write_files(out, {CAMPAIGN_PAGE: document_page(f"{model.name}: {len(found)} records", blocks).encode()})
     _say(blocks)
     again = f", {reused} of them as found before" if reused else ""
-    print(f"\n{out / PAGE}: {len(found)} records{again}" + (f", {len(refused)} refused" if refused else ""))
+    print(f"\n{out / CAMPAIGN_PAGE}: {len(found)} records{again}" + (f", {len(refused)} refused" if refused else ""))
 
 
 def _records_in(folder: Path) -> list[Path]:

@@ -12,9 +12,10 @@ from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
-from study.equations.model_file import WANTED, parse_model
+from study.equations.model_file import MODEL_FILE, parse_model
+from study.explore import PAGE
 from study.explore import session as sessions
-from study.explore.saved import PAGE, files
+from study.explore.saved import files
 from study.explore.session import Session
 from study.support.files import read_text, write_files
 
@@ -35,7 +36,7 @@ def climb(
     taken out comes back only where the error falls below all that was reached.
     """
     arguments = parser().parse_args(["diagnose", *map(str, records), "--model", str(model), *options])
-    text = read_text(model, WANTED)
+    text = read_text(model, MODEL_FILE)
     first = parse_model(text, model)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)

@@ -14,6 +14,7 @@ from study.commands.record_arguments import (
     separated_records,
     sources,
 )
+from study.explore import PAGE
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -22,15 +23,14 @@ if TYPE_CHECKING:
     from study.compare.comparison import Comparison
     from study.compare.fitted_coefficients import Level
 
-PAGE = "explore.html"
-WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
+NOT_TOGETHER = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
     add_each_record_argument(parser)
     parser.add_argument(
-        "--estimator", choices=[n for n in ESTIMATORS if n not in WITHOUT], default="output_error",
+        "--estimator", choices=[n for n in ESTIMATORS if n not in NOT_TOGETHER], default="output_error",
         help="what finds the coefficients: a fit in free run (default), or in reverse from the frequency response "
         "functions; errors_in_variables is for several periods (--period) with noise on the force as well",
     )  # fmt: skip
@@ -38,7 +38,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import each_record
-    from study.compare.comparison import STEPS, across_records
+    from study.compare.comparison import REPORTS, across_records
     from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
     from study.compare.each_record import levels_by_record
     from study.equations.model_file import read_model
@@ -53,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> None:
     tests = [marked] if separate else [[record] for record in records]
     many, unpaged, unpictured = len(tests) > 1, lacking("bokeh", PAGE, "explore"), undrawn()
     files: dict[str, bytes] = {}
-    with progress("step", (STEPS + 1) * len(tests)) as step:
+    with progress("step", (REPORTS + 1) * len(tests)) as step:
         accounted = [
             accounted_together(arguments, model, test, path, estimator=arguments.estimator, progress=step)
             for test, path in zip(tests, sources(arguments), strict=not separate)

@@ -15,6 +15,7 @@ from study.commands.record_arguments import (
     separated_records,
     sources,
 )
+from study.explore import PAGE
 
 if TYPE_CHECKING:
     from study.compare.each_record import Separate
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
-
-PAGE = "explore.html"
 
 
 def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,12 +82,12 @@ def diagnosed_together(
     arguments: argparse.Namespace, model: "Model", records: "list[Record]", path: Path, own: "list[Term]"
 ) -> "tuple[Diagnosed, tuple[Separate, ...]]":
     """The diagnosis of one record, or of several together, and the coefficients that may differ between them."""
-    from study.compare.comparison import STEPS
+    from study.compare.comparison import REPORTS
     from study.diagnose.confirmed_faults import diagnose_accounted
     from study.diagnose.user_candidates import check_on
 
     name = ", ".join(record.name for record in records)
-    with progress("step", STEPS, name) as step:
+    with progress("step", REPORTS, name) as step:
         model, marked, separate = separated_records(arguments, model, records)
         accounted = accounted_together(arguments, model, marked, path, progress=step)
     with progress(" fits", name=name) as step:

@@ -29,7 +29,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.equations.model_file import WANTED, parse_model
+    from study.equations.model_file import MODEL_FILE, parse_model
     from study.support.extras import needed
 
     needed("bokeh", "'study explore'", "explore")
@@ -40,7 +40,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])
-    text, steps = read_text(arguments.model, WANTED), history.read_history(arguments.model)
+    text, steps = read_text(arguments.model, MODEL_FILE), history.read_history(arguments.model)
     model = parse_model(text, arguments.model)
     desk = Desk(_begun(arguments, model, steps), arguments.model, text, folder, inputs_of(arguments))
     try:
@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
 def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -> "Session":
     """The session with the model as given, on one record or fitted to several together and to each by itself."""
-    from study.compare.comparison import STEPS
+    from study.compare.comparison import REPORTS
     from study.explore import session as sessions
     from study.explore.session import Several, by_record, of_own
     from study.faults.accounting import Accounted
@@ -59,7 +59,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate
-    with progress("step", STEPS * (1 + len(records) * many)) as step:
+    with progress("step", REPORTS * (1 + len(records) * many)) as step:
         found = accounted_together(arguments, together, marked, arguments.records[0], progress=step)
         own: list[Accounted] = []
         for record, path in zip(records, sources(arguments), strict=True) if many else ():

@@ -20,7 +20,7 @@ from study.support.errors import StudyError, at, expect
 from study.way_in.compare_records import compare_records
 
 Words = Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]
-COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
+LADDER_COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
 
 
 class Ladder(TableRow):
@@ -83,11 +83,11 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             **about, "error": worst.error, "rms": worst.error * worst.size,
             "unit": found.record.units.get(str(worst.sensor), ""), "floor": found.prediction.floor, "note": "",
         })  # fmt: skip
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return pd.DataFrame(rows, columns=LADDER_COLUMNS)
 
 
 def missing_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
     """The one row of a record whose file is not there."""
     note = f"{row.paths[0]} is not there"
     told = {"record": row.record, "title": title, "step": 0, "added": "", "published": ladder.published, "note": note}
-    return pd.DataFrame([told], columns=COLUMNS)
+    return pd.DataFrame([told], columns=LADDER_COLUMNS)

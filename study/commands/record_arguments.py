@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import finite_number, whole_number
+from study.records import MOTIONS
 from study.support.errors import StudyError
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from study.records.record_layout import Layout
 
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
-MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
 GIVEN = ("dt", "fs", "period", "accept_saturated", "accept_swapped", "free", "as_sampled")  # of ``ReadOptions``

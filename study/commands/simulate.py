@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from study.equations.simulate import Integrator
     from study.support.arrays import Floats
 
-USUAL, MOST_STEPS = 8, 1000
+USUAL_STEPS, MOST_STEPS = 8, 1000
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,7 +92,7 @@ def _enough(rate: float, dt: float) -> int:
     """Steps per sample in which the linear system, of ``rate`` rad/s at most, turns by no more than ``TURN``."""
     from study.equations.simulate import TURN
 
-    return min(max(USUAL, math.ceil(rate * dt / TURN)), MOST_STEPS)
+    return min(max(USUAL_STEPS, math.ceil(rate * dt / TURN)), MOST_STEPS)
 
 
 def _settled(

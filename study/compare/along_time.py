@@ -10,7 +10,7 @@ from study.compare.prediction import SensorPrediction
 from study.support.arrays import Floats
 
 STRETCHES = 6
-BLOCKS = 48  # at most
+MOST_BLOCKS = 48  # of time
 APART = 6.0  # correlation times in a block, at least: then neighbours are nearly independent
 
 
@@ -73,7 +73,7 @@ def _blocks(residual: Floats) -> int:
     power = np.abs(np.fft.rfft(residual - np.mean(residual), size)) ** 2
     correlation = np.fft.irfft(power, size)[: n // 4]
     memory = 2.0 * float(np.sum((correlation / max(float(correlation[0]), 1e-300)) ** 2)) - 1.0
-    return int(np.clip(n / (APART * memory), 2 * STRETCHES, BLOCKS))
+    return int(np.clip(n / (APART * memory), 2 * STRETCHES, MOST_BLOCKS))
 
 
 def _log_powers(values: Floats, count: int) -> Floats:

@@ -9,8 +9,8 @@ from study.compare.force_error import ForceError
 from study.compare.prediction import SensorPrediction
 from study.support.arrays import Floats
 
-MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named
-CLEAR = 2.0  # standard errors above the noise, for a line to count
+MOST_OF_POWER = 2.0 / 3.0  # that is unexplained, at least, lies in the band that is named
+STANDS_OUT = 2.0  # standard errors above the noise, for a line to count
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def bands(views: Sequence[SensorPrediction], forces: Sequence[ForceError]) -> tu
 def _response(view: SensorPrediction) -> Floats:
     """Density of the response that stands above the noise, shape (lines,)."""
     noise = view.noise
-    spread = CLEAR / np.sqrt(noise.averages)
+    spread = STANDS_OUT / np.sqrt(noise.averages)
     response = np.where(noise.residual > noise.density * (1.0 + spread), noise.residual - noise.density, 0.0)
     response[noise.frequency < view.prepared.low] = 0.0
     return response
@@ -46,7 +46,7 @@ def _force(force: ForceError) -> Floats:
     return np.where(force.band & (force.unexplained > force.noise), force.unexplained - force.noise, 0.0) * force.force
 
 
-def narrowest(of: str, frequency: Floats, power: Floats, most: float = MOST) -> Band | None:
+def narrowest(of: str, frequency: Floats, power: Floats, most: float = MOST_OF_POWER) -> Band | None:
     """The shortest run of lines which holds at least ``most`` of the power; of several, the one with most power.
 
     A line stands for the band of its width about it.

@@ -15,7 +15,7 @@ from study.equations.model import Model
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.coefficients import Estimate
-from study.identify.frequency_domain.starting_values import FAINT
+from study.identify.frequency_domain.linear_start import FAINT
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone, told_back
@@ -25,7 +25,7 @@ from study.records.spectra import Segments, cross_spectra
 from study.support.errors import StudyError
 
 FREE_RUN = "output_error"
-STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little
+RUN_STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little
 FOLLOWED, SMOOTHED = 0.5, 5  # coherence, over so many lines, up to the last of which the displacement is no noise
 
 
@@ -69,7 +69,7 @@ def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Est
             f"open, or take {FREE_RUN}"
         )
     known = model.with_values({key: estimate[key] for key in estimate.symbols})
-    run = fit_part(known, prepared, tuple(known.values), steps=STEPS)
+    run = fit_part(known, prepared, tuple(known.values), steps=RUN_STEPS)
     return replace(run, converged=not identified.note, message=identified.note or run.message), estimate
 
 

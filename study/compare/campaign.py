@@ -18,8 +18,8 @@ from study.figures.labels import prefixed, term_names
 from study.support import document
 from study.support.numbers import percent
 
-TITLE = "Measured records"
-VERDICTS = {
+MEASURED_RECORDS = "Measured records"
+VERDICTS_IN_WORDS = {
     "missing_effect": "an effect is missing", "missing_effects": "several effects are missing",
     "partly_known": "effects are missing, and something that has no name", "nothing_missing": "nothing is missing",
     "unknown_effect": "something unknown is missing",
@@ -98,11 +98,11 @@ def campaign_blocks(
     """
     rigs = _by_rig(records, by)
     every = [record for rig in rigs.values() for record in rig]
-    counts = [(word, sum(r.diagnosis["verdict"] == key for r in every)) for key, word in VERDICTS.items()]
+    counts = [(word, sum(r.diagnosis["verdict"] == key for r in every)) for key, word in VERDICTS_IN_WORDS.items()]
     said = "; ".join(f"{word} in {count}" for word, count in counts if count)
     heading = ("record", "level", "error", "noise floor", "verdict", "effects", "explain", "error with them")
     page: list[document.Block] = [
-        document.Heading(TITLE, 1), document.Text(f"{len(every)} records: {said}."),
+        document.Heading(MEASURED_RECORDS, 1), document.Text(f"{len(every)} records: {said}."),
         document.Bullets(tuple(sentence for rig, rows in rigs.items() for sentence in _differences(rig[0], rows))),
         document.table(heading, [_verdict(record) for record in every]),
     ]  # fmt: skip
@@ -192,7 +192,7 @@ def _verdict(record: Measured) -> tuple[str, ...]:
         effects = ""
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
-        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
+        percent(record.comparison["noise_floor"]["response"]), VERDICTS_IN_WORDS.get(verdict, verdict),
         effects, percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip

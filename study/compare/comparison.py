@@ -40,7 +40,7 @@ from study.records.record import MOTIONS, Record, Sensor
 from study.records.record_layout import records_judged
 from study.support.errors import StudyError, expect
 
-STEPS = 5  # reports of progress a record
+REPORTS = 5  # of progress on a record
 Progress = Callable[[str], None]
 Value = tuple[float, float, str]  # value, standard error (not a number where it was held), unit
 CHAOTIC = (
@@ -168,7 +168,7 @@ def compare(
     ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``search``
     what ``fit_model`` gave where that was called already, ``fit`` the finished fit of a candidate. ``estimator`` finds
     the coefficients: the fit in free run, or one of ``study.identify.estimators``; with ``local_polynomial`` the error
-    of the force is free of leakage too. ``progress`` is called with what is being done, ``STEPS`` times. A model that
+    of the force is free of leakage too. ``progress`` is called with what is being done, ``REPORTS`` times. A model that
     cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)

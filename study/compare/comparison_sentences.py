@@ -14,14 +14,13 @@ from study.equations.place import place_in_words
 from study.equations.terms import LINEAR
 from study.records.record import FORCE
 from study.support.numbers import by_chance, percent
+from study.support.thresholds import ALPHA, TOLERANCE
 
-NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
-CHANCE = 0.01  # p value below which a change along the record is no chance
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
-SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
+SURE_POWER = 0.4  # standard error of a power, at most, for it to be called by a whole number
 HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
-NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
+POWER_NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
 
@@ -30,7 +29,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
     sentences = [_how_good(comparison, diagnosed)]
     if comparison.prediction.error >= HOPELESS:
         sentences.append(_least(comparison))
-    elif comparison.prediction.above_noise > NEGLIGIBLE:
+    elif comparison.prediction.above_noise > TOLERANCE:
         sentences.append(_where(comparison))
     if comparison.model.named:
         sentences += _of_equations(comparison)
@@ -73,7 +72,7 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
         source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
         return f"{start}, which looks like noise{source}: hardly any of it is above the noise floor of {floor}{doubt}"
-    if comparison.prediction.above_noise <= NEGLIGIBLE:
+    if comparison.prediction.above_noise <= TOLERANCE:
         return (
             f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.above_noise)} of "
             "the response, too little to say that anything is missing"
@@ -166,7 +165,7 @@ def _whole(way: Growth) -> int | None:
     nearest = round(way.power)
     # a power is called by a whole number as near as this
     near = abs(way.power - nearest) <= max(0.25, TOLD_APART * way.power_error)
-    return nearest if near and way.power_error <= SURE and nearest in (0, 1, *NAMES) else None
+    return nearest if near and way.power_error <= SURE_POWER and nearest in (0, 1, *POWER_NAMES) else None
 
 
 def _power(way: Growth, whole: int | None) -> str:
@@ -174,11 +173,11 @@ def _power(way: Growth, whole: int | None) -> str:
         return "the size"
     if way.power >= 5.9:  # the powers that are tried end at six
         return "a power of six or more"
-    return f"the {NAMES[whole]}" if whole in NAMES else f"about the power {way.power:.1f}"
+    return f"the {POWER_NAMES[whole]}" if whole in POWER_NAMES else f"about the power {way.power:.1f}"
 
 
 def _along(along: AlongTime) -> str:
-    if along.p_value >= CHANCE:
+    if along.p_value >= ALPHA:
         return f"it does not change along the record ({by_chance(along.p_value)})"
     if along.confounded:
         return "it changes along the record, but so does the level, and the two cannot be told apart here"

@@ -28,9 +28,9 @@ from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
 WINDOW = 6.0  # periods over which a frequency is taken
-BAND = (0.5, 1.6)  # of the frequency: what lies outside is offset, drift and overtones
+PASS_BAND = (0.5, 1.6)  # of the frequency: what lies outside is offset, drift and overtones
 ENDS = 2.0  # periods at each end where the analytic signal knows too little
-QUIET = 4.0  # amplitude over the noise floor's rms below which nothing is read
+OVER_FLOOR = 4.0  # amplitude over the noise floor's rms: below, nothing is read
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def decays(fit: FreeRunFit, prepared: Prepared, floor: float, number: int = 0) -
     response = str(prepared.outputs.sensors[number])
     omega, _ = frequency_and_rate(prepared.record.part(*prepared.plan.fit), response)
     wholes = _whole_stretches(prepared.record)
-    least = QUIET * floor
+    least = OVER_FLOOR * floor
     measured = [_decay(s.source[response][s.first : s.last], prepared.dt, omega, least) for s in wholes]
     predicted: Decay | None = None
     if not fit.model.modal:  # no sensor shows the state of a mode
@@ -129,8 +129,8 @@ def _analytic(values: Floats, dt: float, omega: float) -> np.ndarray:
     before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
     longer = np.concatenate([before, values, after])
     lines = fftfreq(len(longer), dt) * 2.0 * np.pi / omega
-    rise = np.clip((lines / BAND[0] - 0.5) / 0.5, 0.0, 1.0) * np.clip(
-        (1.25 * BAND[1] - lines) / (0.25 * BAND[1]), 0.0, 1.0
+    rise = np.clip((lines / PASS_BAND[0] - 0.5) / 0.5, 0.0, 1.0) * np.clip(
+        (1.25 * PASS_BAND[1] - lines) / (0.25 * PASS_BAND[1]), 0.0, 1.0
     )
     return np.asarray(ifft(2.0 * rise * fft(longer)))[edge : edge + n]
 
@@ -161,7 +161,7 @@ def _joined(parts: list[Decay]) -> Decay:
     return Decay(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
-DEGREE = 3  # of the polynomial that the carrier's complex amplitude is
+CARRIER_DEGREE = 3  # of the polynomial that the carrier's complex amplitude is
 OVERTONES = 3  # of the motion, which a carrier alone would leave
 
 
@@ -181,7 +181,7 @@ def at_the_release(values: Floats, dt: float, omega: float, independent: float) 
     """
     t = dt * np.arange(len(values))
     turn = omega * t
-    slow = np.asarray(t[:, None] ** np.arange(DEGREE + 1), dtype=np.float64)
+    slow = np.asarray(t[:, None] ** np.arange(CARRIER_DEGREE + 1), dtype=np.float64)
     around = [slow * np.cos(turn)[:, None], -slow * np.sin(turn)[:, None]]
     carrier: Floats = np.stack(around, axis=2).reshape(len(t), -1)
     beside: list[Floats] = [f(n * turn) for n in range(2, OVERTONES + 1) for f in (np.cos, np.sin)]

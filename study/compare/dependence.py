@@ -31,7 +31,7 @@ from study.support.least_squares import least_squares
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
-DEGREE = 7
+HIGHEST_POWER = 7
 DEPENDENCE_SAMPLES = 16384  # samples of either part that are looked at
 
 
@@ -211,7 +211,7 @@ def _shapes(place: Place, left: Unexplained) -> dict[str, Floats]:
 
 
 def _functions(x: Floats) -> list[Floats]:
-    powers = [x**n for n in range(2, DEGREE + 1)]
+    powers = [x**n for n in range(2, HIGHEST_POWER + 1)]
     return [*powers, np.abs(x), x * np.abs(x), np.sign(x), np.clip(x, -0.5, 0.5), np.clip(x, -1.0, 1.0)]
 
 
@@ -226,7 +226,7 @@ def _formulas(u: float, v: float) -> dict[str, list[str]]:
 
 
 def _formulas_of(x: str, size: float) -> list[str]:
-    powers = [f"{x}**{n}" for n in range(2, DEGREE + 1)]
+    powers = [f"{x}**{n}" for n in range(2, HIGHEST_POWER + 1)]
     limits = [f"max(min({x}, {share * size!r}), {-share * size!r})" for share in (0.5, 1.0)]
     return [*powers, f"abs({x})", f"{x}*abs({x})", f"sgn({x})", *limits]
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from study.compare.panels import DOTTED
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations import dimensions
 
-MEASURED: dict[str, Any] = {"color": "0.55", "linewidth": 2.4, "label": "measured"}
+MEASURED_CURVE: dict[str, Any] = {"color": "0.55", "linewidth": 2.4, "label": "measured"}
 MODEL: dict[str, Any] = {"color": "C0", "linewidth": 1.3, "label": "model"}
-BAND: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
 
 
 def response_magnitude(axes: Axes, functions: ResponseFunctions, unit: str, highest: float) -> Axes:
@@ -24,7 +24,7 @@ def response_magnitude(axes: Axes, functions: ResponseFunctions, unit: str, high
     axes.fill_between(
         functions.frequency, np.maximum(measured - half, 1e-2 * measured), measured + half, color="0.85", linewidth=0.0
     )
-    axes.plot(functions.frequency, measured, **MEASURED)
+    axes.plot(functions.frequency, measured, **MEASURED_CURVE)
     axes.plot(functions.frequency, predicted, **MODEL)
     axes.set_yscale("log")
     heights = np.concatenate([measured, predicted])
@@ -36,7 +36,7 @@ def response_magnitude(axes: Axes, functions: ResponseFunctions, unit: str, high
 
 def response_phase(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
     """Phase of H(f) in degrees."""
-    for values, look in zip(functions.phase, (MEASURED, MODEL), strict=True):
+    for values, look in zip(functions.phase, (MEASURED_CURVE, MODEL), strict=True):
         gaps = np.concatenate([[False], np.abs(np.diff(values)) > 180.0])
         axes.plot(functions.frequency, np.where(gaps, np.nan, values), **look)
     axes.set_ylim(-190.0, 190.0)
@@ -47,7 +47,7 @@ def response_phase(axes: Axes, functions: ResponseFunctions, highest: float) -> 
 
 def coherence_panel(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
     """Ordinary coherence of force and response, of the record and of the model's free run."""
-    axes.plot(functions.frequency, functions.coherence, **MEASURED)
+    axes.plot(functions.frequency, functions.coherence, **MEASURED_CURVE)
     axes.plot(functions.frequency, functions.coherence_predicted, **MODEL)
     axes.set_ylim(0.0, 1.03)
     axes.set_ylabel("coherence (1)")
@@ -74,7 +74,7 @@ def with_force(axes: Axes, checks: ResidualChecks) -> Axes:
 
 def _banded(axes: Axes, band: float, label: str) -> Axes:
     for side in (-band, band):
-        axes.axhline(side, label="99 % band" if side > 0.0 else None, **BAND)
+        axes.axhline(side, label="99 % band" if side > 0.0 else None, **DOTTED)
     axes.set_xlabel("lag (s)")
     axes.set_ylabel(label)
     return axes

@@ -30,7 +30,7 @@ from study.identify.frequency_domain.inputs import (
     with_known_changes,
     without_inertia,
 )
-from study.records.plan import FEWEST
+from study.records.plan import SHORTEST_PART
 from study.records.prepared import FORCE
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra, cross_spectra_within
@@ -40,7 +40,7 @@ from study.support.errors import StudyError
 FEWEST_AVERAGES = 4  # for each input
 AUDIBLE = 1e-6  # of its largest density: the force has no power on lines below
 HEARD = 1e-4  # of its largest density
-ABOVE = 2.0  # the motion stands above its noise where its density is at least so many times that of the noise
+ABOVE_NOISE = 2.0  # the motion stands above its noise where its density is at least so many times that of the noise
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def force_error(model: Model, view: SensorPrediction) -> ForceError | None:
 def _segments(stretches: Sequence[int], inputs: int) -> Segments:
     """The usual segments, shortened until there are enough averages for so many inputs; lengths of the stretches."""
     cut, wanted = segments_of(sum(stretches)), FEWEST_AVERAGES * inputs
-    while cut.length > FEWEST and sum(cut.effective_averages(n) for n in stretches if n >= cut.length) < wanted:
+    while cut.length > SHORTEST_PART and sum(cut.effective_averages(n) for n in stretches if n >= cut.length) < wanted:
         cut = replace(cut, length=cut.length // 2)
     return cut
 
@@ -232,5 +232,5 @@ def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, view: S
 def lines_to_judge(frequency: Floats, response: Floats, noise: Floats, force: Floats, low: float) -> NDArray[np.bool_]:
     """Lines to judge by; if none passes, all of those on which the force has power."""
     heard = (force > AUDIBLE * float(np.max(force))) & (frequency >= max(low, frequency[1]))
-    clear = heard & (response >= ABOVE * noise)
+    clear = heard & (response >= ABOVE_NOISE * noise)
     return clear if np.any(clear) else heard

@@ -9,8 +9,8 @@ from study.support.arrays import Floats
 
 CELLS = (21, 15, 11, 7)  # along each axis of the map, from the finest
 CLASSES = 24  # of a curve
-FEWEST = 8  # visits, for a mean with an error
-REACH = 0.001  # quantile at each end where map and curves end
+FEWEST_VISITS = 8  # for a mean with an error
+END_QUANTILE = 0.001  # where map and curves end, on each side
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def curve(at: Floats, force: Floats) -> ForceCurve:
     inside = (place >= 0) & (place < CLASSES)
     mean, error, visits = _means(place, force, inside, CLASSES)
     centre = _means(place, at, inside, CLASSES)[0]
-    keep = visits >= FEWEST
+    keep = visits >= FEWEST_VISITS
     return ForceCurve(centre[keep], mean[keep], error[keep])
 
 
@@ -49,7 +49,7 @@ def surface(u: Floats, v: Floats, force: Floats, cells: int | None = None) -> Su
     bounds = [edges(x, cells) for x in (u, v)]
     place, inside = _cell(u, v, bounds)
     mean, error, visits = _means(place, force, inside, cells * cells)
-    seen = visits >= FEWEST
+    seen = visits >= FEWEST_VISITS
     grids = [np.where(seen, x, np.nan).reshape(cells, cells) for x in (mean, error)]
     return Surface(bounds[0], bounds[1], grids[0], grids[1])
 
@@ -59,7 +59,7 @@ def cells_of(u: Floats, v: Floats) -> int:
     for cells in CELLS:
         place, inside = _cell(u, v, [edges(x, cells) for x in (u, v)])
         visits = np.bincount(place[_entered(place, inside)], minlength=cells * cells)
-        if np.count_nonzero(visits[place[inside]] >= FEWEST) > 0.5 * len(u):
+        if np.count_nonzero(visits[place[inside]] >= FEWEST_VISITS) > 0.5 * len(u):
             return cells
     return CELLS[-1]
 
@@ -78,7 +78,7 @@ def _entered(place: NDArray[np.int64], inside: NDArray[np.bool_]) -> NDArray[np.
 
 def edges(values: Floats, classes: int) -> Floats:
     """Edges of classes of equal width, shape (classes + 1,), from which a few extreme samples stand out."""
-    low, high = (float(q) for q in np.quantile(values, [REACH, 1.0 - REACH]))
+    low, high = (float(q) for q in np.quantile(values, [END_QUANTILE, 1.0 - END_QUANTILE]))
     return np.linspace(low, high, classes + 1)
 
 

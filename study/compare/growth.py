@@ -15,7 +15,7 @@ from study.compare.missing_force import MissingForce
 from study.support.arrays import Floats
 
 POWERS = np.arange(0.0, 6.01, 0.25)
-BLOCKS = 24
+JACKKNIFE_BLOCKS = 24
 VISIBLE = 1e-3  # of a shape must be left beside the fitted terms, for it to be tried
 NOISE_AT_MOST = 0.98  # of the power
 WAYS: dict[tuple[str, str], Callable[[Floats, Floats, float], Floats]] = {
@@ -112,7 +112,7 @@ def _way(
 
 def _blocks(values: Floats) -> Floats:
     """Sums over blocks of time, shape (blocks,)."""
-    size = max(len(values) // BLOCKS, 1)
+    size = max(len(values) // JACKKNIFE_BLOCKS, 1)
     count = len(values) // size
     return np.sum(values[: size * count].reshape(count, size), axis=1)
 

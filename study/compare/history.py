@@ -14,8 +14,8 @@ from study.support.numbers import percent
 from study.support.yaml_text import shown
 
 Step = dict[str, Any]
-WANTED = "the steps as 'study add' writes them"
-KINDS: Mapping[str, Any] = {  # what a step holds
+STEPS_FILE = "the steps as 'study add' writes them"
+STEP_FIELDS: Mapping[str, Any] = {  # what a step holds
     "terms": list, "record": str, "unit": str, "rms": int | float, "error.response": int | float,
     "error.force": int | float | NoneType, "noise_floor.response": int | float, "added": str | NoneType,
     "dropped": str | NoneType,
@@ -47,19 +47,19 @@ def read_history(model: Path) -> list[Step]:
     if not os.path.exists(path):  # noqa: PTH110  (false also for a name that no file can have)
         return []
     try:
-        content: object = json.loads(read_text(path, WANTED))
+        content: object = json.loads(read_text(path, STEPS_FILE))
     except json.JSONDecodeError as error:
-        raise StudyError(f"{path}: line {error.lineno} is not JSON; expected {WANTED}") from None
+        raise StudyError(f"{path}: line {error.lineno} is not JSON; expected {STEPS_FILE}") from None
     except RecursionError:
-        raise StudyError(f"{path}: it is nested too deeply; expected {WANTED}") from None
+        raise StudyError(f"{path}: it is nested too deeply; expected {STEPS_FILE}") from None
     except ValueError:  # Python reads no number of thousands of digits
-        raise StudyError(f"{path}: it holds a number of too many digits; expected {WANTED}") from None
+        raise StudyError(f"{path}: it holds a number of too many digits; expected {STEPS_FILE}") from None
     steps = cast(Step, content).get("steps") if isinstance(content, dict) else None
     if not isinstance(steps, list):
-        raise StudyError(f"{path}: it holds no list of steps; expected {WANTED}")
+        raise StudyError(f"{path}: it holds no list of steps; expected {STEPS_FILE}")
     for number, step in enumerate(cast(list[object], steps)):
         if fault := _fault(step):
-            raise StudyError(f"{path}: step {number} {fault}; expected {WANTED}")
+            raise StudyError(f"{path}: step {number} {fault}; expected {STEPS_FILE}")
     return cast(list[Step], steps)
 
 
@@ -68,7 +68,7 @@ def _fault(step: object) -> str:
     if not isinstance(step, dict):
         return f"is {shown(step)}"
     given = cast(Step, step)
-    for keys, kinds in KINDS.items():
+    for keys, kinds in STEP_FIELDS.items():
         value: Any = given
         for key in keys.split("."):
             if not isinstance(value, dict) or (key not in value and keys not in OPTIONAL):

@@ -18,7 +18,7 @@ from study.records.spectra import Segments
 from study.support.arrays import Floats
 from study.support.statistics import IN_A_BLOCK
 
-BLOCKS = 64  # at most
+LINK_BLOCKS = 64  # of time, at most
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def visits_in_blocks(lacking: MissingForce) -> Visits:
 
 def _bounds(samples: int) -> NDArray[np.int64]:
     """First sample of each block, and the one after the last."""
-    return np.linspace(0, samples, int(np.clip(samples // IN_A_BLOCK, 1, BLOCKS)) + 1).round().astype(np.int64)
+    return np.linspace(0, samples, int(np.clip(samples // IN_A_BLOCK, 1, LINK_BLOCKS)) + 1).round().astype(np.int64)
 
 
 def _place(values: Floats, bounds: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -17,7 +17,7 @@ from study.compare.prediction import SensorPrediction
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.local_polynomial import (
-    SPARE,
+    SPARE_LINES,
     Lines,
     LocalPolynomial,
     noise_variance,
@@ -47,7 +47,7 @@ def local_force_error(model: Model, view: SensorPrediction) -> ForceError | None
         return None
     inputs, (*driven, response, acting) = equation.inputs, equation.channels
     lines = transform([*driven, acting], record.dt)
-    local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE) // 2)
+    local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE_LINES) // 2)
     index = _bands(lines, local, record.name)
     frequency = np.concatenate([[0.0], lines.frequency[index[:, local.half_width]]])
     force = _with_zero(_power(lines.output[index]) * lines.density)

@@ -35,8 +35,8 @@ from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.modal_lines import unit_forces
 from study.identify.frequency_domain.starting_values import oscillator
 from study.identify.time_domain.told_alone import is_alone, prepared_alone
-from study.records.completion import SETTLED, derivative
-from study.records.noise_floor import CLEAR, SMOOTH
+from study.records.completion import UNCERTAIN_PERIODS, derivative
+from study.records.noise_floor import AVERAGED, CLEAR
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments
@@ -300,15 +300,15 @@ def _edge(prediction: Prediction, width: float) -> int:
     """Half the memory of the gate, and what an integration needs to settle; at most an eighth of all."""
     memory = 0.5 / (width * prediction.dt)
     low = prediction.prepared.band[0]
-    settling = SETTLED / (low * prediction.dt) if low > 0.0 else 0.0
+    settling = UNCERTAIN_PERIODS / (low * prediction.dt) if low > 0.0 else 0.0
     return min(round(max(memory, settling)), len(prediction.measured) // 8)
 
 
 def lines_above_noise(noise: Noise, low: float) -> Bools:
     """Lines on which the residual, averaged over a few of them, surely stands above the noise."""
-    few = np.ones(SMOOTH)
+    few = np.ones(AVERAGED)
     level = np.convolve(noise.residual, few, "same") / np.convolve(np.ones_like(noise.residual), few, "same")
-    spread = CLEAR / np.sqrt(noise.averages * SMOOTH / 2.0)  # 2: neighbouring lines share a taper
+    spread = CLEAR / np.sqrt(noise.averages * AVERAGED / 2.0)  # 2: neighbouring lines share a taper
     return (level > noise.density * (1.0 + spread)) & (noise.frequency >= low)
 
 

@@ -15,8 +15,8 @@ from study.records.record import Sensor
 from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 
-SAME = 1e-3  # rms by which the force of two periods may differ, over its own
-WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
+SAME_FORCE = 1e-3  # rms by which that of two periods may differ, over its own
+WHITE, SCATTER, INTEGRATION = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def noise_of(
     floor = noise_floor.floor(difference, dt, low)
     averages = cut.effective_averages(len(difference))
     white = floor.noise**2 / (0.5 / dt - low)
-    quiet = averages * len(frequency) / cut.line_inflation() * noise_floor.QUIET / noise_floor.BANDS
+    quiet = averages * len(frequency) / cut.line_inflation() * noise_floor.QUIETEST_BANDS / noise_floor.BANDS
     noise = Noise(
         frequency, np.full_like(frequency, white), density, floor.noise, 0.5 * floor.noise / np.sqrt(quiet),
         floor.excess, floor.significance, averages, WHITE,
@@ -68,7 +68,7 @@ def noise_of(
     if scatter is not None:
         noise = _with_density(noise, autospectrum(scatter, dt, cut)[1], low, len(difference), len(scatter))
     if noise.rms < numerical:
-        noise = replace(noise, rms=numerical, source=EXACT)
+        noise = replace(noise, rms=numerical, source=INTEGRATION)
     # Noise is a part of what is left: an estimate of it that scatters above all of that is cut back to it.
     return replace(noise, rms=min(noise.rms, float(np.sqrt(np.mean(residual**2)))))
 
@@ -89,7 +89,7 @@ def _between_periods(prepared: Prepared, sensor: Sensor) -> Floats | None:
     alike = np.ones(count - 1, dtype=np.bool_)
     for name in record.forces:
         force = record[name][first:last].reshape(count, period)
-        alike &= np.sqrt(np.mean(np.diff(force, axis=0) ** 2, axis=1)) < SAME * float(np.std(force))
+        alike &= np.sqrt(np.mean(np.diff(force, axis=0) ** 2, axis=1)) < SAME_FORCE * float(np.std(force))
     settled = np.diff(motion, axis=0)[alike] / np.sqrt(2.0)
     if not len(settled):
         return None

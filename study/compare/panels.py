@@ -20,21 +20,21 @@ from study.equations import dimensions
 from study.figures import labels
 from study.support.arrays import Floats
 
-COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
+DRAWN_COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
 MEASURED: dict[str, Any] = {"color": "0.62", "label": "measured"}
 PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}
 RESIDUAL: dict[str, Any] = {"color": "C1", "label": "measured less predicted"}
-NOISE: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
-FLOOR = 1e-6  # shares below are drawn there
+DOTTED: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
+LOWEST_DRAWN = 1e-6  # shares below are drawn there
 
 
 def time_history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **more: Any) -> Axes:
     """A history, or, if it is long, the band between its extremes in each column of the picture."""
-    if len(values) <= 2 * COLUMNS:
+    if len(values) <= 2 * DRAWN_COLUMNS:
         style: dict[str, Any] = {"linewidth": 0.9, **look, **more}
         axes.plot(time, values, **style)
         return axes
-    bounds = np.linspace(0, len(values), COLUMNS + 1).astype(int)[:-1]
+    bounds = np.linspace(0, len(values), DRAWN_COLUMNS + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, bounds), np.maximum.reduceat(values, bounds)
     filled: dict[str, Any] = {**look, **more, "linewidth": 0.3}
     axes.fill_between(time[bounds], low, high, **filled)
@@ -56,7 +56,7 @@ def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: s
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(difference))))
     time_history(axes, *with_breaks(time, difference / factor), RESIDUAL)
     for k, side in enumerate((-2.0, 2.0)):
-        axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **NOISE)
+        axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **DOTTED)
     return _time_axis(axes, time, f"difference ({dimensions.pretty(shown)})")
 
 
@@ -84,7 +84,7 @@ def force_error_panel(axes: Axes, error: ForceError, highest: float) -> Axes:
     )  # fmt: skip
     axes.plot(f, _shown(error.parametric[keep]), color="C0", label="left by the fitted coefficients")
     axes.plot(f, _shown(error.unexplained[keep]), color="C1", linestyle=(0, (5.0, 2.0)), label="1 - multiple coherence")
-    axes.plot(f, _shown(error.noise[keep]), label="noise on the response alone", **NOISE)
+    axes.plot(f, _shown(error.noise[keep]), label="noise on the response alone", **DOTTED)
     axes.set_yscale("log")
     axes.set_ylim(_limits(error, keep))
     axes.set_xlim(0.0, highest)
@@ -101,7 +101,7 @@ def _limits(error: ForceError, keep: NDArray[np.bool_]) -> tuple[float, float]:
 
 
 def _shown(share: Floats) -> Floats:
-    return np.maximum(share, FLOOR)
+    return np.maximum(share, LOWEST_DRAWN)
 
 
 def missing_force_panel(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
@@ -159,7 +159,7 @@ def error_in_time(axes: Axes, along: AlongTime, floor: float) -> Axes:
     response, error = [100.0 * s.response for s in along.stretches], [100.0 * s.error for s in along.stretches]
     axes.stairs(response, edges, baseline=None, color="0.35", linewidth=1.4, label="response")
     axes.stairs(error, edges, baseline=None, color="C1", linewidth=2.0, label="error")
-    axes.axhline(100.0 * floor, label="noise floor", **NOISE)
+    axes.axhline(100.0 * floor, label="noise floor", **DOTTED)
     axes.set_yscale("log", subs=[])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")

@@ -16,7 +16,6 @@ from study.figures.page import frame_cells
 from study.support.numbers import percent
 
 DARK = 0.55  # share from which a number is written in white
-ALTERNATE = ("C0", "C1")
 
 
 def sensor_errors(axes: Axes, prediction: Prediction) -> Axes:

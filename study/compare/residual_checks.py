@@ -16,10 +16,10 @@ from study.compare.response_functions import drive_of
 from study.support.arrays import Floats
 
 LAGS = 100  # to each side, at most
-LEVEL = 0.99  # of the bands, at each lag
-QUANTILE = float(ndtri(0.5 + LEVEL / 2.0))
+BAND_LEVEL = 0.99  # at each lag
+QUANTILE = float(ndtri(0.5 + BAND_LEVEL / 2.0))
 BINS = 41
-REACH = 4.0  # standard deviations of the histogram
+HISTOGRAM_REACH = 4.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def residual_checks(prediction: Prediction, sensor: int = 0) -> ResidualChecks:
     # n times the variance of an estimated cross-correlation is the sum of the autocorrelations' products (Ljung, 16.6)
     spread = max(float(np.sum(own * drive)), 0.0)
     steps = prediction.dt * np.arange(-(lags - 1), lags, dtype=np.float64)
-    edges = np.linspace(-REACH, REACH, BINS + 1).astype(np.float64)
+    edges = np.linspace(-HISTOGRAM_REACH, HISTOGRAM_REACH, BINS + 1).astype(np.float64)
     counts = np.histogram(residual / (float(np.std(residual)) or 1.0), edges)[0] / (n * (edges[1] - edges[0]))
     return ResidualChecks(
         steps[lags - 1 :], own[lags - 1 :], QUANTILE / np.sqrt(n), steps, both, QUANTILE * float(np.sqrt(spread / n)),

@@ -11,12 +11,11 @@ import numpy as np
 
 from study.compare.noise import segments_of
 from study.compare.prediction import Prediction, SensorPrediction
+from study.identify.frequency_domain.linear_start import FAINT
 from study.records.record import FORCE, MOTIONS, Sensor
 from study.records.spectra import SpectralMatrix, cross_spectra
 from study.support.arrays import Complexes, Floats
 from study.support.errors import expect
-
-LOUD = 1e-3  # of the drive's largest density: what is divided by less is no response
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ def response_functions(prediction: Prediction, sensor: int = 0) -> ResponseFunct
     measured = cross_spectra([drive, seen.measured], prediction.dt, cut)
     predicted = cross_spectra([drive, seen.predicted], prediction.dt, cut)
     power = measured.density[:, 0, 0].real
-    kept = (measured.frequency > 0.0) & (power > LOUD * np.max(power))
+    kept = (measured.frequency > 0.0) & (power > FAINT * np.max(power))
     (h, coherence), (model, of_model) = _h1(measured), _h1(predicted)
     spread = np.sqrt((1.0 - coherence) / (2.0 * measured.averages * np.maximum(coherence, np.finfo(float).eps)))
     return ResponseFunctions(

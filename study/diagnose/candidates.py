@@ -25,7 +25,7 @@ from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.thresholds import PROMISING, TOLERANCE
 
-FITTED = 12  # of many, those that promise most, whatever they are: fitted in free run ...
+MOST_PROMISING = 12  # of many, whatever they are: fitted in free run ...
 AT_EACH_PLACE = 2  # ... with so many at each place that explain ``PROMISING`` of what the best explains ...
 OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
 Progress = Callable[[int, int, str], None]  # called with how many were fitted, of how many, and what: "sets of 3"
@@ -146,7 +146,7 @@ def worth_fitting(ordered: Sequence[Screened]) -> list[Screened]:
     for rank, item in enumerate(ordered):
         path, effect = item.entry.place.path, item.entry.term.name
         near = places.get(path, 0) < AT_EACH_PLACE and item.share >= PROMISING * best
-        if rank < FITTED or near or effects.get(effect, 0) < OF_EACH_EFFECT:
+        if rank < MOST_PROMISING or near or effects.get(effect, 0) < OF_EACH_EFFECT:
             chosen.append(item)
             places[path] = places.get(path, 0) + 1
             effects[effect] = effects.get(effect, 0) + 1

@@ -20,9 +20,9 @@ from study.support.arrays import Complexes, Floats
 from study.support.least_squares import length_or_one
 from study.support.thresholds import ALPHA, TOLERANCE
 
-INDISTINCT = 1e-6
-BANDS = 8
-CLASSES = 4
+LEAST_ALONE = 1e-6
+FREQUENCY_BANDS = 8
+AMPLITUDE_CLASSES = 4
 BLOCK = 64  # samples: long against a period, short against the swell of the amplitude
 
 
@@ -54,7 +54,7 @@ def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, d
     taper = np.hanning(len(residual))
     s, e = np.asarray(rfft(sensitivity * taper)), np.asarray(rfft(residual * taper))
     power = np.abs(s) ** 2
-    edges = _equal_shares(power, BANDS)
+    edges = _equal_shares(power, FREQUENCY_BANDS)
     frequency = np.asarray(rfftfreq(len(residual), dt))
     rows = [_band(s[a:b], e[a:b], frequency[a:b]) for a, b in pairwise(edges) if b - a > 3]
     change = np.array([row[1] for row in rows], dtype=np.complex128)
@@ -86,7 +86,7 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     own: Floats = np.sum(s**2, axis=1)
     cross: Floats = np.sum(s * e, axis=1)
     order: NDArray[np.intp] = np.argsort(own)
-    edges = _equal_shares(own[order], CLASSES)
+    edges = _equal_shares(own[order], AMPLITUDE_CLASSES)
     noise = _noise(own, cross)
     at, value, error = list[float](), list[float](), list[float]()
     for a, b in pairwise(edges):
@@ -126,7 +126,7 @@ def curves(
     own = jacobian[:, columns] @ (direction / size)
     basis = np.linalg.qr(np.delete(jacobian / length_or_one(jacobian), columns, axis=1))[0]
     alone = own - basis @ (basis.T @ own)
-    if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
+    if np.linalg.norm(alone) <= LEAST_ALONE * np.linalg.norm(own):
         return None, None
     each, left = alone.reshape(-1, sensors).T, fit.residual.reshape(-1, sensors).T
     most = int(np.argmax(np.sum(each**2, axis=1)))

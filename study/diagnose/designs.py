@@ -12,7 +12,7 @@ import numpy as np
 from study.equations.linear_part import acting, matrices
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.completion import derivative
-from study.records.driven_by_motion import SAID
+from study.records.driven_by_motion import BASE_MOVES
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples, largest_between
 from study.records.prepared import FORCE, Prepared
@@ -190,7 +190,7 @@ def present_test(prepared: Prepared, fit: FreeRunFit) -> PresentTest:
         bool(drivers) or prescribed or bool(record.forces),
         f"{record.name}: a release of a structure is not planned; expected a record with a force, or of a single mass",
     )
-    based = OF_THE_GROUND in record.forces or any(note.startswith(SAID) for note in prepared.notes)
+    based = OF_THE_GROUND in record.forces or any(note.startswith(BASE_MOVES) for note in prepared.notes)
     # the way in takes the mass that the model gives as known, and one where it gives none
     scale = -(fit.model.values.get("m") or 1.0) if based and drivers == (FORCE,) else 1.0
     deflection = np.zeros(0) if based else _deflection(prepared, fit, drivers, peaks)  # nothing pulls at it on a table

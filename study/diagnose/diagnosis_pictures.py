@@ -19,8 +19,8 @@ from study.figures.labels import term_names
 from study.figures.styles import in_style
 from study.support.numbers import percent
 
-FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
-LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
+CANDIDATES_FOLLOWED = 3  # their coefficient is drawn along frequency and amplitude
+LEAST_DRAWN = -30.0  # per cent: a candidate that explains less is drawn there
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
@@ -53,7 +53,7 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
         f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
         columns=2, width=page.width(2), panel=2.8, share=False,
     )  # fmt: skip
-    constancy_panels(panels[0], panels[1], diagnosis.candidates[:FOLLOWED])
+    constancy_panels(panels[0], panels[1], diagnosis.candidates[:CANDIDATES_FOLLOWED])
     page.shared_legend(constancy, panels)
     return {"candidates": widest, "constancy": constancy}
 
@@ -64,13 +64,15 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     place = np.arange(len(rows))
     shares = np.array([100.0 * r.gain.explained for r in rows])
     errors = np.array([100.0 * r.gain.error for r in rows])
-    axes.barh(place, np.clip(shares, LEAST, 100.0), height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
+    axes.barh(
+        place, np.clip(shares, LEAST_DRAWN, 100.0), height=0.62, color=["0.25" if i == 0 else "0.7" for i in place]
+    )
     axes.errorbar(
-        np.clip(shares, LEAST, 100.0), place, xerr=errors, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5
+        np.clip(shares, LEAST_DRAWN, 100.0), place, xerr=errors, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5
     )
     axes.set_yticks(place, [_label(r, rows[0]) for r in rows])
     axes.invert_yaxis()
-    axes.set_xlim(min(0.0, 1.1 * float(np.min(np.clip(shares, LEAST, 0.0), initial=0.0))), 136.0)
+    axes.set_xlim(min(0.0, 1.1 * float(np.min(np.clip(shares, LEAST_DRAWN, 0.0), initial=0.0))), 136.0)
     axes.set_xticks([0, 20, 40, 60, 80, 100])
     for y, row in zip(place, rows, strict=True):
         axes.annotate(f"leaves {percent(row.response_error)}", (1.0, y), xycoords=("axes fraction", "data"),

@@ -14,7 +14,7 @@ from study.support.numbers import percent
 from study.support.statistics import Gain
 
 TIES = 2  # ties named in the table; the file names all
-SHOWN = 8  # candidates in the table on the screen
+ON_SCREEN = 8  # candidates in the table
 
 
 def candidate_table(diagnosis: Diagnosis) -> str:
@@ -45,7 +45,7 @@ def _why_this_order(diagnosis: Diagnosis) -> str:
 def shown_rows(diagnosis: Diagnosis) -> list[tuple[int, Ranked]]:
     """The candidates that a table shows, each with its rank: the first, and all of the user's own."""
     every = list(enumerate(diagnosis.candidates, start=1))
-    return every[:SHOWN] + [(number, row) for number, row in every[SHOWN:] if row.term.name not in LIBRARY]
+    return every[:ON_SCREEN] + [(number, row) for number, row in every[ON_SCREEN:] if row.term.name not in LIBRARY]
 
 
 def _shown(number: int, row: Ranked) -> list[str]:
@@ -81,7 +81,7 @@ def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
     rows, named = {row.name: row for row in diagnosis.candidates}, diagnosis.comparison.model.named
     families = diagnosis.families
-    on = [{**f.place.plain(), "on": f.family, "explained": f.gain.explained} for f in families[:SHOWN]]
+    on = [{**f.place.plain(), "on": f.family, "explained": f.gain.explained} for f in families[:ON_SCREEN]]
     return {
         "verdict": diagnosis.verdict,
         "candidates": [_candidate(row, rows, named) for row in diagnosis.candidates],
@@ -104,9 +104,9 @@ def set_table(diagnosis: Diagnosis) -> str:
             str(i), ", ".join(row.names), percent(row.gain.explained, "z.1f"), percent(row.response_error),
             str(row.unknowns), "-" if i == 1 else f"{max(row.distance, 0.0):.1f} standard errors",
         ]
-        for i, row in enumerate(diagnosis.sets[:SHOWN], start=1)
+        for i, row in enumerate(diagnosis.sets[:ON_SCREEN], start=1)
     ]  # fmt: skip
-    more = len(diagnosis.sets) - SHOWN
+    more = len(diagnosis.sets) - ON_SCREEN
     shown = tabulate(rows, head, tablefmt="simple", disable_numparse=True)
     return shown + (f"\n... and {more} more, in diagnosis.json" if more > 0 else "")
 

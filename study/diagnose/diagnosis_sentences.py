@@ -16,7 +16,7 @@ from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 NAMED = 3  # effects that cannot be told apart, before the others are counted
-CLOSE = 0.05  # families this close to the best one are named with it
+NAMED_WITHIN = 0.05  # families this close to the best one are named with it
 
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -162,7 +162,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
     if families:
         best_place = families[0].place
         shares = [(f.family, f.gain.explained) for f in families if f.place == best_place]
-        named = [name for name, share in shares if share > shares[0][1] - CLOSE]
+        named = [name for name, share in shares if share > shares[0][1] - NAMED_WITHIN]
         where = f" {place_in_words(best_place)}" if best_place.label else ""
         said.append(
             f"The missing force depends on {' or '.join(named)}{where}: general functions of it explain "

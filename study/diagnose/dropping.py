@@ -11,7 +11,8 @@ from study.equations.layout import check
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain.starting_values import reverse_start
-from study.identify.time_domain.fit_model import NEAR, best_fit, fit_model, grown_states
+from study.identify.time_domain.continuation import NEAR
+from study.identify.time_domain.fit_model import best_fit, fit_model, grown_states
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.weighted_fit import finished
@@ -20,7 +21,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
-RUNS = 15  # free runs of a fit that asks what a model would be without a term
+RUNS_WITHOUT = 15  # a term: free runs of a fit that asks what a model would be
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ def fitted_without(fit: FreeRunFit, name: str, prepared: Prepared, start: dict[s
     for begin in _starts(model, prepared, start, held):
         try:
             yield fit_part(
-                model, prepared, held, begin, steps=fit.steps_per_sample, max_iterations=RUNS, initial=states,
+                model, prepared, held, begin, steps=fit.steps_per_sample, max_iterations=RUNS_WITHOUT, initial=states,
                 offset=NEAR, noise=fit.noise,
             )  # fmt: skip
         except StudyError:

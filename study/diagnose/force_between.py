@@ -17,7 +17,7 @@ from study.diagnose.verdict import NOTHING, Diagnosis, diagnose, search_part
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
-from study.records.interpolation import BAND_LIMITED, READINGS, WORDS
+from study.records.interpolation import BAND_LIMITED, BETWEEN_SAMPLES, WORDS
 from study.records.prepared import Prepared
 from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError
@@ -55,7 +55,7 @@ def _better_read(comparison: Comparison, best: float) -> Iterator[Prepared]:
     begins from nothing: what was fitted under a wrong reading may be far from the truth.
     """
     now, sampled = comparison.prediction, _sampled(comparison)
-    for reading in (name for name in READINGS if name != sampled.record.between):
+    for reading in (name for name in BETWEEN_SAMPLES if name != sampled.record.between):
         record = replace(sampled.record, between=reading)
         other = replace(sampled, record=record, notes=(*sampled.notes, _note(reading, comparison)))
         other = without_spare_samples(other) if comparison.prepared.as_sampled else other

@@ -17,9 +17,7 @@ from study.records.prepared import Prepared
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
-from study.support.least_squares import least_squares, length_or_one
-
-RANK = 1e-9  # of the largest singular value: directions below are not seen
+from study.support.least_squares import DISTINCT, least_squares, length_or_one
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,5 +176,5 @@ def _spread(jacobian: Floats) -> Floats:
     scale = np.linalg.norm(jacobian, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
     _, sizes, directions = np.linalg.svd(jacobian / scale, full_matrices=False)
-    seen = sizes > RANK * sizes[0]
+    seen = sizes > DISTINCT * sizes[0]
     return np.asarray(directions[seen].T / sizes[seen] / scale[:, None], dtype=np.float64)

@@ -15,7 +15,7 @@ from scipy.fft import rfft, rfftfreq
 from study.diagnose.candidates import FittedCandidate, unknowns_of
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
-from study.identify.frequency_domain.starting_values import FAINT
+from study.identify.frequency_domain.linear_start import FAINT
 from study.identify.time_domain.part_fit import with_states
 from study.identify.time_domain.shape_search import CUTOFF, Baseline, sensitivity
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone

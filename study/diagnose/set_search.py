@@ -22,7 +22,7 @@ from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.thresholds import ALPHA
 
-MOST = 4  # effects in a set
+MOST_EFFECTS = 4  # in a set
 EACH = 6  # sets of a size that are fitted from one beginning
 
 
@@ -102,7 +102,7 @@ def searched(
     offered |= {entry.name: entry for entry in not_alone}
     entries = {c.name: c.entry for c in singles} | {entry.name: entry for entry in not_alone}
     search = SetSearch(base, entries, offered, {frozenset(c.names): c for c in singles})
-    sizes = range(2, MOST + 1)
+    sizes = range(2, MOST_EFFECTS + 1)
     search.fit(SetStart(frozenset(c.names), c.fit.model) for c in settled)
     reverse = set_screening.by_the_reverse_system(offered, base, sizes, EACH)
     try:

@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
-from study.diagnose import candidates, set_search, varying_candidates
+from study.diagnose import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, candidates, set_search, varying_candidates
 from study.diagnose.candidates import FittedCandidate, Progress, unknowns_of, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -36,11 +36,9 @@ from study.support import statistics
 from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
-MISSING, SEVERAL, PARTLY_KNOWN = "missing_effect", "missing_effects", "partly_known"
-NOTHING, UNKNOWN = "nothing_missing", "unknown_effect"
-SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
-MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-CLOSE = 12  # sets near the best that are compared with it in every detail
+LONGEST_SEARCH = 16384  # samples: a search uses half of the fitting part if that is more than the least, up to so many
+NAMED_FIRST = 0.5  # of what is unexplained: an effect of a component, or of a decay, that explains it is named first
+RIVALS = 12  # sets near the best that are compared with it in every detail
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,11 +234,11 @@ def search_part(prepared: Prepared) -> Prepared:
     More where that is a quiet stretch, such as the end of a sweep, which shows less than half of the motion's size.
     """
     if prepared.record.stretches:  # what is loud and what is quiet lie in stretches of their own
-        return prepared.shortened(LONG)
+        return prepared.shortened(LONGEST_SEARCH)
     first, last = prepared.plan.fit
-    wanted = max((last - first) // 2, prepared.samples_in(shape_search.PERIODS))
-    look = prepared.shortened(int(np.clip(wanted, SHORT, LONG)))
-    return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONG)
+    wanted = max((last - first) // 2, prepared.samples_in(shape_search.SEARCH_PERIODS))
+    look = prepared.shortened(int(np.clip(wanted, shape_search.SEARCH_SAMPLES, LONGEST_SEARCH)))
+    return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONGEST_SEARCH)
 
 
 def search_base(comparison: Comparison) -> Baseline:
@@ -281,7 +279,7 @@ def _decide(
         if first.unknowns <= 2 and not ((first.flexible or changing) and one.left > TOLERANCE):
             return one
         # a clock, a memory or a shape of its own imitates what several simple effects leave nothing of
-        fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST + 1
+        fewer_than = first.unknowns if one.left <= TOLERANCE else set_search.MOST_EFFECTS + 1
     changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
     known = {c.name for c in tried}
@@ -360,7 +358,7 @@ def _verdict_on(sets: Sequence[Ranked], left: float, prepared: Prepared, asked: 
     if explained >= NEARLY and not one:
         return SEVERAL
     necessary = all(set(answer.names) <= set(row.names) for row in sets)
-    return PARTLY_KNOWN if explained >= MOST and necessary and not answer.wanders(asked) else UNKNOWN
+    return PARTLY_KNOWN if explained >= NAMED_FIRST and necessary and not answer.wanders(asked) else UNKNOWN
 
 
 def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int) -> list[Ranked]:
@@ -368,7 +366,7 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
     alone = {row.name: row for row in rows}
     every = sorted(search.tried.values(), key=by_power)
     best = every[0]
-    near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:CLOSE]
+    near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:RIVALS]
     near += [c for names, c in search.tried.items() if c not in near and any(names < set(n.names) for n in near[:3])]
     found = [alone.get(c.name, c) for c in near]
     return rank(with_best_settled(found, comparison.prepared), comparison, asked + len(search.tried))
@@ -443,7 +441,7 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
     """
     alone = prepared.response == FORCE or prepared.free
-    return alone and first.gain.explained > MOST and not first.unphysical
+    return alone and first.gain.explained > NAMED_FIRST and not first.unphysical
 
 
 def _leaves_nothing(candidate: FittedCandidate) -> bool:

@@ -10,7 +10,7 @@ from study.records.prepared import Prepared
 from study.records.record import FORCE, MOTIONS, OF_THE_GROUND, Sensor
 from study.support.errors import expect
 
-SAID = (
+NO_FORCE_ACTS = (
     "no force acts, so that the record fixes the coefficients but for one common factor: all are per unit mass (give "
     "one of them in the model, such as {term: inertia, value: 5.3}, for those of the structure)"
 )
@@ -29,7 +29,7 @@ def per_unit_mass(model: Model, prepared: Prepared) -> tuple[Model, Prepared]:
         record, channels={**record.channels, **still}, forces=tuple(forces),
         units={**record.units, **dict.fromkeys(forces, per_mass)},
     )  # fmt: skip
-    return model.with_values({mass: 1.0}), replace(prepared, record=record, notes=(*prepared.notes, SAID))
+    return model.with_values({mass: 1.0}), replace(prepared, record=record, notes=(*prepared.notes, NO_FORCE_ACTS))
 
 
 def _mass(model: Model) -> str | None:

@@ -7,10 +7,10 @@ from fractions import Fraction
 from study.equations import formulas
 
 Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
-NONE: Dimensions = (Fraction(0), Fraction(0))
+DIMENSIONLESS: Dimensions = (Fraction(0), Fraction(0))
 MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration, the shape whose coefficient is a mass
 OF_NUMBERS = ("sin", "cos", "tan", "exp", "log", "tanh")  # functions of a number alone
-VARIABLES: dict[str, Dimensions] = {
+VARIABLE_DIMENSIONS: dict[str, Dimensions] = {
     "u": (Fraction(1), Fraction(0)),
     "v": (Fraction(1), Fraction(-1)),
     "t": (Fraction(0), Fraction(1)),
@@ -19,7 +19,7 @@ VARIABLES: dict[str, Dimensions] = {
 
 def dimensions(text: str, known: dict[str, Dimensions]) -> Dimensions | None:
     """Powers of length and time of a formula; None where its parts do not share them."""
-    return _dimensions(formulas.parse(text), VARIABLES | known)
+    return _dimensions(formulas.parse(text), VARIABLE_DIMENSIONS | known)
 
 
 def agrees(text: str, known: dict[str, Dimensions], *, angle: bool = False) -> bool:
@@ -29,16 +29,16 @@ def agrees(text: str, known: dict[str, Dimensions], *, angle: bool = False) -> b
     """
     calls = (node for node in ast.walk(formulas.parse(text)) if isinstance(node, ast.Call))
     plain = (call for call in calls if isinstance(call.func, ast.Name) and call.func.id in OF_NUMBERS)
-    found = [_dimensions(call.args[0], VARIABLES | known) for call in plain]
-    return dimensions(text, known) is not None and all(d == NONE or (angle and d is not None) for d in found)
+    found = [_dimensions(call.args[0], VARIABLE_DIMENSIONS | known) for call in plain]
+    return dimensions(text, known) is not None and all(d == DIMENSIONLESS or (angle and d is not None) for d in found)
 
 
 def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | None:
     match tree:
         case ast.Constant():
-            return NONE
+            return DIMENSIONLESS
         case ast.Name(id=name):
-            return known.get(name, NONE if name == "pi" else None)
+            return known.get(name, DIMENSIONLESS if name == "pi" else None)
         case ast.UnaryOp(operand=operand):
             return _dimensions(operand, known)
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
@@ -53,13 +53,14 @@ def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | No
                 return (a[0] + sign * b[0], a[1] + sign * b[1])
             return a if a == b else None
         case ast.Call(func=ast.Name(id="abs" | "max" | "min"), args=arguments):
-            units = {_dimensions(a, known) for a in arguments} - {NONE}  # a bare number, as in max(u, 0), takes any
-            return NONE if not units else units.pop() if len(units) == 1 else None
+            # a bare number, as in max(u, 0), takes any
+            units = {_dimensions(a, known) for a in arguments} - {DIMENSIONLESS}
+            return DIMENSIONLESS if not units else units.pop() if len(units) == 1 else None
         case ast.Call(func=ast.Name(id="sqrt"), args=[argument]):
             a = _dimensions(argument, known)
             return None if a is None else (a[0] / 2, a[1] / 2)
         case ast.Call(func=ast.Name()):
-            return NONE
+            return DIMENSIONLESS
         case _:
             return None
 

@@ -14,7 +14,7 @@ from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
 CHARACTERS = 300  # at most
-DEEPEST = 40
+DEEPEST_FORMULA = 40
 ONE_AT_A_TIME = Lock()  # Python before 3.13 counts the depth of a tree that it makes for all threads together
 LARGEST_EXPONENT = 16.0
 
@@ -46,8 +46,8 @@ def parse(text: str) -> ast.expr:
     while level:
         deepest += 1
         level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
-    if deepest > DEEPEST:
-        raise ExpressionError(f"the expression {text!r} is nested more than {DEEPEST} deep")
+    if deepest > DEEPEST_FORMULA:
+        raise ExpressionError(f"the expression {text!r} is nested more than {DEEPEST_FORMULA} deep")
     return tree
 
 

@@ -28,7 +28,7 @@ from study.support.recent import Recent
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
 ROUGH = 0.5  # largest step times the fastest rate
 FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
-FEWEST, MOST = 4, 32  # steps a sample between which the median rate sets the bound
+LOWEST_BOUND, HIGHEST_BOUND = 4, 32  # steps a sample between which the median rate sets the bound
 Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
 
@@ -329,8 +329,8 @@ def needed_steps(
     """
     rates = _rates(model, record, outputs)
     if not np.all(np.isfinite(rates)):
-        return most or FEWEST
-    most = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
+        return most or LOWEST_BOUND
+    most = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), LOWEST_BOUND, HIGHEST_BOUND))
     motions = outputs.measured(record, (0, len(record)))
     fastest = max(float(np.max(rates)), *(angular_rate(motion, record.dt) for motion in motions.T))
     return int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, most))

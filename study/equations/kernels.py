@@ -22,7 +22,7 @@ from study.support.errors import StudyError
 if TYPE_CHECKING:
     from study.equations.motion_program import MotionProgram
 
-LIBRARY = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.so'}"
+COMPILED = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.so'}"
 SOURCES = Path(__file__).parent / "c"
 PROJECT = "reverse-miso-study"
 NO_MEMORY = -2  # what a function returns that found none
@@ -51,13 +51,13 @@ def _function(name: str) -> Any:
 
 def compiled_library() -> Path:
     """The library beside this file, or the installed one: a job on a cluster has sources alone."""
-    if LIBRARY.exists():
-        return LIBRARY
+    if COMPILED.exists():
+        return COMPILED
     with suppress(PackageNotFoundError):
-        installed = Path(str(distribution(PROJECT).locate_file(f"study/equations/{LIBRARY.name}")))
+        installed = Path(str(distribution(PROJECT).locate_file(f"study/equations/{COMPILED.name}")))
         if installed.exists():
             return installed
-    raise StudyError(f"{LIBRARY} is not there, which installing builds; expected `pip install .` to have been run")
+    raise StudyError(f"{COMPILED} is not there, which installing builds; expected `pip install .` to have been run")
 
 
 def evaluate(program: Program, columns: Mapping[str, Floats], samples: int) -> Floats:

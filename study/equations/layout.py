@@ -26,10 +26,10 @@ from study.equations.terms import LINEAR
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
-KEYS = ("coordinates", "forces", "linear")
+STRUCTURE_KEYS = ("coordinates", "forces", "linear")
 MODAL, ALIAS = "modal", "measured"
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
-MOST = 40  # coordinates
+MOST_COORDINATES = 40
 Forces = tuple[tuple[str, str], ...]
 
 
@@ -41,7 +41,9 @@ def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...
     given = as_list(top["coordinates"])
     if not given:
         raise StudyError(f"'coordinates' is {shown(top['coordinates'])}; expected a list such as [floor1, floor2]")
-    expect(len(given) <= MOST, f"'coordinates' has {len(given)} entries; at most {MOST} are read")
+    expect(
+        len(given) <= MOST_COORDINATES, f"'coordinates' has {len(given)} entries; at most {MOST_COORDINATES} are read"
+    )
     names = tuple(_name(item, "a coordinate") for item in given)
     for name in names:
         expect(names.count(name) == 1, f"'coordinates' lists {name!r} twice; expected each once")

@@ -41,7 +41,7 @@ from study.support.yaml_text import as_list, as_mapping, scalar, shown
 LONGEST_NAME = 100
 MOST_TERMS = 200
 NO_TERMS = re.compile(r"^terms:[ \t]*(#.*)?$", re.MULTILINE)  # of an entry that was taken out with its list
-WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
+MODEL_FILE = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
 
 
 def read_model(path: Path) -> Model:
@@ -50,7 +50,7 @@ def read_model(path: Path) -> Model:
     What a killed run has left half changed is put back first.
     """
     recover(path)
-    return parse_model(read_text(path, WANTED), path)
+    return parse_model(read_text(path, MODEL_FILE), path)
 
 
 def parse_model(text: str, source: Path) -> Model:
@@ -61,7 +61,7 @@ def parse_model(text: str, source: Path) -> Model:
         if top is None:
             content = "is empty" if document is None else f"holds {shown(document)}"
             raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
-        yaml_text.refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
+        yaml_text.refuse_unknown(top, ("name", "terms", *layout.STRUCTURE_KEYS), "the model")
         name = top.get("name", source.stem)
         if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
             raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
@@ -145,7 +145,7 @@ def text_with(path: Path, entry: Term | ModelTerm) -> str:
 
     Every byte that was there stays, comments, order and quoting included.
     """
-    text = read_text(path, WANTED)
+    text = read_text(path, MODEL_FILE)
     before = parse_model(text, path)
     new = entry if isinstance(entry, ModelTerm) else free(entry)
     if new.name in before:
@@ -162,7 +162,7 @@ def text_without(path: Path, name: str) -> str:
 
     Every other byte stays, but for a comment behind the entry on its own line.
     """
-    text = read_text(path, WANTED)
+    text = read_text(path, MODEL_FILE)
     before = parse_model(text, path)
     if name not in before or (len(before.terms) == 1 and not before.modal):
         raise StudyError(f"{path}: {shown(name)} cannot be taken out of {', '.join(t.name for t in before.terms)}")

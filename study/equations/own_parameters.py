@@ -57,7 +57,7 @@ def parameters_of(names: Sequence[str], formula: str) -> tuple[ShapeParameter, .
         expect(name in used, f"the formula {formula!r} lacks its parameter {name!r}; it uses {', '.join(used)}")
     # the search tries all combinations of their values
     expect(len(names) <= 3, f"{len(names)} parameters are listed; at most 3 are searched together")
-    channels = dict.fromkeys(set(used) - set(names) - set(formulas.VARIABLES), dimensions.NONE)
+    channels = dict.fromkeys(set(used) - set(names) - set(formulas.VARIABLES), dimensions.DIMENSIONLESS)
     possible = [dict(zip(names, quantities, strict=True)) for quantities in product(SEARCHES, repeat=len(names))]
     for angle in (False, True):  # a sine of u, where that is an angle, is not of a number
         for quantity in possible:

@@ -12,9 +12,9 @@ from study.equations.model import Model
 from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
-POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
-NOTHING = 1e-150  # a force below counts as zero
-SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
+POINTS, FEWEST_FINITE = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
+NO_FORCE = 1e-150  # what is below counts as zero
+UNACCOUNTED = 1e-10  # share of a formula that others leave, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 
 
@@ -34,7 +34,7 @@ def repeated_force(model: Model) -> str | None:
     names, values = _forces(model, dict(zip(variables, data.T, strict=True)))
     size = np.max(np.abs(values), axis=0)
     for i in (i for i, name in enumerate(names) if name not in LIBRARY):
-        if size[i] < NOTHING:
+        if size[i] < NO_FORCE:
             return f"the force of {names[i]!r} is zero at every motion; expected a formula that changes with u, v or t"
         if parts := _made_of(model, names, values, i, evenly=True):
             return (
@@ -80,7 +80,7 @@ def _forces(model: Model, motion: Mapping[str, Floats]) -> tuple[tuple[str, ...]
     program = graph.program([unit_force(graph, c, inputs, None) for _, c in pairs])
     values = kernels.evaluate(program, {name: motion[name] for name in inputs}, len(motion["u"]))
     names, finite = tuple(name for name, _ in pairs), np.all(np.isfinite(values), axis=1)
-    return names, values[finite] if np.count_nonzero(finite) >= FEWEST else np.eye(len(names))
+    return names, values[finite] if np.count_nonzero(finite) >= FEWEST_FINITE else np.eye(len(names))
 
 
 def _made_of(model: Model, names: Sequence[str], values: Floats, i: int, *, evenly: bool) -> list[str]:
@@ -90,12 +90,12 @@ def _made_of(model: Model, names: Sequence[str], values: Floats, i: int, *, even
     """
     held = {t.name for t in model.terms if None not in t.coefficients}
     size = np.max(np.abs(values), axis=0)
-    if names[i] in held or size[i] < NOTHING:
+    if names[i] in held or size[i] < NO_FORCE:
         return []
-    others = [j for j, name in enumerate(names) if name not in held and size[j] >= NOTHING and j != i]
+    others = [j for j, name in enumerate(names) if name not in held and size[j] >= NO_FORCE and j != i]
     own = values[:, [i, *others]]
     if evenly:
-        own = own / np.maximum(np.max(np.abs(own), axis=1), NOTHING)[:, None]
+        own = own / np.maximum(np.max(np.abs(own), axis=1), NO_FORCE)[:, None]
     shares = _shares(own[:, 0], own[:, 1:])
     found = [] if shares is None else [names[j] for j, share in zip(others, shares, strict=True) if share > TAKES_PART]
     return list(dict.fromkeys(found))
@@ -108,4 +108,4 @@ def _shares(wanted: Floats, others: Floats) -> Floats | None:
     parts = amounts * others / size
     left = float(np.linalg.norm(wanted - np.sum(parts, axis=1)))
     largest = float(np.max(np.abs(wanted)))
-    return np.max(np.abs(parts), axis=0) / largest if left < SAME * float(np.linalg.norm(wanted)) else None
+    return np.max(np.abs(parts), axis=0) / largest if left < UNACCOUNTED * float(np.linalg.norm(wanted)) else None

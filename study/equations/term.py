@@ -202,12 +202,12 @@ class Term:
 
 OF_VARIATION = "of what it varies with"  # time, or a channel of any unit
 QUANTITIES = {
-    "length": dimensions.VARIABLES["u"],
-    "time": dimensions.VARIABLES["t"],
-    "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
-    "velocity": dimensions.VARIABLES["v"],
-    "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
-    OF_VARIATION: dimensions.NONE,
-    "number": dimensions.NONE,
+    "length": dimensions.VARIABLE_DIMENSIONS["u"],
+    "time": dimensions.VARIABLE_DIMENSIONS["t"],
+    "frequency": (dimensions.DIMENSIONLESS[0], dimensions.DIMENSIONLESS[1] - 1),
+    "velocity": dimensions.VARIABLE_DIMENSIONS["v"],
+    "1/length": (dimensions.DIMENSIONLESS[0] - 1, dimensions.DIMENSIONLESS[1]),
+    OF_VARIATION: dimensions.DIMENSIONLESS,
+    "number": dimensions.DIMENSIONLESS,
 }
-STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements
+STATE_DIMENSIONS = dimensions.VARIABLE_DIMENSIONS["u"]  # the states of the library are internal displacements

@@ -20,12 +20,12 @@ from study.support import yaml_text
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
-KEYS = ("term", "varies_with", "shape", "knots", "lasts", "only", "changes", "held", STEP_AT)
+VARIATION_KEYS = ("term", "varies_with", "shape", "knots", "lasts", "only", "changes", "held", STEP_AT)
 
 
 def entry_of(of: Term, item: Mapping[object, object]) -> ModelTerm:
     """The change of a term's coefficients, from its entry."""
-    yaml_text.refuse_unknown(item, (*KEYS, *(p.name for p in of.parameters)), f"{of.name} that varies")
+    yaml_text.refuse_unknown(item, (*VARIATION_KEYS, *(p.name for p in of.parameters)), f"{of.name} that varies")
     along, shape, side = item["varies_with"], item.get("shape", "curve"), item.get("only", "")
     if not isinstance(along, str):
         raise StudyError(f"varies_with of {of.name} is {shown(along)}; expected 'time' or the name of a channel")

@@ -5,3 +5,5 @@ findings on a record into columns: of the record, of each sensor, of each place;
 tell them, ``cards`` says what stands on the page, ``plots`` draws, ``html_page`` puts it together. ``saved`` makes one
 file that needs no network, and what else is written on saving; ``desk`` and ``server`` are the live page.
 """
+
+PAGE = "explore.html"  # the file that holds it

@@ -18,9 +18,9 @@ from study.explore.page_units import Scale, motion, power
 from study.support.arrays import Floats
 
 Columns = dict[str, Any]
-LEAST = 0.005  # of the rms force
-CLOSE, SHORT, LONG = 0.5, 1.4, 2.6  # decades of an axis with even ticks, three or two in a decade
-MARGIN = 1.2  # by which an axis reaches beyond what it shows, at most
+LEAST_FORCE = 0.005  # of its rms
+EVEN_BELOW, THREE_BELOW, TWO_BELOW = 0.5, 1.4, 2.6  # decades of an axis with even ticks, three or two in a decade
+AXIS_MARGIN = 1.2  # by which an axis reaches beyond what it shows, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Focus:
     @cached_property
     def force(self) -> Scale:
         """Of the force that is missing at the place."""
-        largest = max(LEAST * rms_force(self.comparison), _largest(self.within[2]))
+        largest = max(LEAST_FORCE * rms_force(self.comparison), _largest(self.within[2]))
         return power(units_at(self.place, self.comparison.record)[0], largest)
 
     @property
@@ -117,9 +117,9 @@ def log_axis(*columns: Any) -> tuple[float, float]:
 def log_ticks(low: float, high: float) -> list[float]:
     """Ticks of a logarithmic axis that do not collide: 1, 2, 5 of a decade, 1 and 3, or decades alone."""
     reach = math.log10(high / low)
-    if reach < CLOSE:
-        return even_ticks(low / MARGIN, high * MARGIN)
-    mantissas = (1.0, 2.0, 5.0) if reach < SHORT else (1.0, 3.0) if reach < LONG else (1.0,)
+    if reach < EVEN_BELOW:
+        return even_ticks(low / AXIS_MARGIN, high * AXIS_MARGIN)
+    mantissas = (1.0, 2.0, 5.0) if reach < THREE_BELOW else (1.0, 3.0) if reach < TWO_BELOW else (1.0,)
     every = max(1, math.ceil(reach / 5.0))  # five ticks or so
     first, last = math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1
     return [m * 10.0**power for power in range(first, last + 1) if power % every == 0 for m in mantissas]

@@ -20,12 +20,12 @@ class Panel:
 
 Card = tuple[Panel, ...]
 SPECTRUM = Panel("spectrum", "Difference of the response")
-FORCE: Card = (
+FORCE_LEFT: Card = (
     Panel("force", "What is left of the force"),
     Panel("coherence", "Share of the force explained", "cumulative coherence: what each term, computed from the "
           "measured motion, adds"), SPECTRUM,
 )  # fmt: skip
-MISSING: Card = (
+MISSING_FORCE: Card = (
     Panel("plane", "Missing force"), Panel("against_u", "… against displacement"),
     Panel("against_v", "… against velocity"),
 )  # fmt: skip
@@ -35,7 +35,7 @@ BY_FREQUENCY: Card = (
 )
 BY_SENSOR: Card = (Panel("sensors", "Error by sensor"), replace(SPECTRUM, about="of the selected sensor"))
 PHASE = Panel("phase", "… its phase")
-FUNCTIONS: Card = (
+RESPONSE_FUNCTIONS: Card = (
     Panel("frf", "Frequency response", "H1 of the judged part, of the record and of the model's free run under the "
           "same force"), PHASE,
     Panel("linearity", "… coherence with the force", "below one in both: nonlinear; in the measured alone: noise, or "
@@ -43,7 +43,7 @@ FUNCTIONS: Card = (
 )  # fmt: skip
 STIFFNESS: Card = (
     Panel("frf", "Dynamic stiffness", "force over displacement, of the record and of the model under the same motion"),
-    replace(PHASE, about="the loss angle"), replace(FUNCTIONS[2], heading="… its coherence"),
+    replace(PHASE, about="the loss angle"), replace(RESPONSE_FUNCTIONS[2], heading="… its coherence"),
 )  # fmt: skip
 LOOPS: Card = (
     Panel("loop_u", "Force over displacement", "the loops of the judged part"), Panel("loop_v", "… over velocity"),
@@ -57,11 +57,11 @@ ITSELF = Panel("autocorrelation", "Difference with itself", "a right model in wh
                "the band")  # fmt: skip
 DRIVE = Panel("with_force", "… with the force", "a right model leaves nothing outside of the band, whatever the colour "
               "of the noise")  # fmt: skip
-SPREAD = Panel("histogram", "… its distribution", "σ: the standard deviation of the difference")
+DISTRIBUTION = Panel("histogram", "… its distribution", "σ: the standard deviation of the difference")
 CHECKS: dict[str, tuple[Card, ...]] = {
-    DRIVEN: (FUNCTIONS, (ITSELF, DRIVE, SPREAD)),
-    PRESCRIBED: (LOOPS, STIFFNESS, (ITSELF, replace(DRIVE, heading="… with the displacement"), SPREAD)),
-    FREE: (DECAY, (ITSELF, SPREAD)),
+    DRIVEN: (RESPONSE_FUNCTIONS, (ITSELF, DRIVE, DISTRIBUTION)),
+    PRESCRIBED: (LOOPS, STIFFNESS, (ITSELF, replace(DRIVE, heading="… with the displacement"), DISTRIBUTION)),
+    FREE: (DECAY, (ITSELF, DISTRIBUTION)),
 }  # of each kind of test
 
 
@@ -69,8 +69,8 @@ def cards_of(comparison: Comparison) -> tuple[tuple[Card, ...], tuple[Card, ...]
     """The cards of the place that is selected in a sketch, above the response, and those below it."""
     checks = CHECKS[kind_of(comparison)]
     if not comparison.model.named:
-        return (), (FORCE, MISSING, *checks)
-    return (MISSING, BY_FREQUENCY), (BY_SENSOR, *((FORCE[:2],) if comparison.forces else ()), *checks)
+        return (), (FORCE_LEFT, MISSING_FORCE, *checks)
+    return (MISSING_FORCE, BY_FREQUENCY), (BY_SENSOR, *((FORCE_LEFT[:2],) if comparison.forces else ()), *checks)
 
 
 def history_height(steps: int) -> int:

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from study.equations.model import Model
+from study.explore import PAGE
 from study.explore import session as sessions
-from study.explore.saved import PAGE, files, of_stage
+from study.explore.saved import files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
 from study.support.files import write_files

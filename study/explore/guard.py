@@ -15,9 +15,9 @@ from bokeh.util.token import check_token_signature, get_token_payload
 from tornado.httputil import HTTPServerRequest
 from tornado.web import ErrorHandler
 
-NAMES = ("127.0.0.1", "localhost", "[::1]")
-PAGE, SOCKET, FILES = "/", "/ws", "/static/"  # what a page asks for; Bokeh would serve other pages' scripts as well
-FORBIDDEN, UNKNOWN = 403, 404
+HOST_NAMES = ("127.0.0.1", "localhost", "[::1]")
+PAGE_PATH, SOCKET, STATIC = "/", "/ws", "/static/"  # what a page asks for; Bokeh would serve others' scripts as well
+FORBIDDEN, NOT_FOUND = 403, 404
 SIGNED = "Bokeh-Session-Id"  # a session that is asked for by name; a page never does
 
 
@@ -25,7 +25,7 @@ class GuardedTornado(BokehTornado):
     """Bokeh's application behind the guard."""
 
     def __init__(self, applications: Any, port: int, key: bytes, **options: Any) -> None:
-        self.hosts = frozenset(f"{name}:{port}" for name in NAMES)
+        self.hosts = frozenset(f"{name}:{port}" for name in HOST_NAMES)
         self.key = key
         super().__init__(
             applications, secret_key=key, sign_sessions=True, extra_websocket_origins=sorted(self.hosts), **options
@@ -56,7 +56,7 @@ def refusal(request: HTTPServerRequest, hosts: frozenset[str], key: bytes) -> in
         return FORBIDDEN
     if request.path == SOCKET:
         return 0 if valid(headers.get("Sec-WebSocket-Protocol", ""), key) else FORBIDDEN
-    return 0 if request.path == PAGE or request.path.startswith(FILES) else UNKNOWN
+    return 0 if request.path == PAGE_PATH or request.path.startswith(STATIC) else NOT_FOUND
 
 
 def valid(protocols: str, key: bytes) -> bool:

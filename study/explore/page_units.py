@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from study.figures import labels
 from study.support.errors import StudyError
 from study.support.numbers import percent
-from study.support.units import FORCE, LENGTH, role_unit
+from study.support.units import A_FORCE, A_LENGTH, role_unit
 
 EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
 EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
-LONG = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
+LONG_NUMBER = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
 KNOWN = 1e4  # times its error: a value that is larger
-PLAIN = (-3, 5)  # powers of ten from which on, and up to which, no power is written
+PLAIN_POWERS = (-3, 5)  # of ten: from the first on, and below the last, none is written
 NO_BREAK = "\u00a0"
 RAISED = str.maketrans("0123456789-/.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ·")
 
@@ -78,7 +78,7 @@ def with_error(value: float, half: float) -> tuple[str, str]:
     if largest > KNOWN * half:
         return number(value, 6), number(half, 2)
     power = math.floor(math.log10(largest))
-    power = power if power >= PLAIN[1] or power < PLAIN[0] else 0
+    power = power if power >= PLAIN_POWERS[1] or power < PLAIN_POWERS[0] else 0
     last = math.floor(math.log10(half)) - 1 - power  # the decimal of the error's second digit
     shown = (f"{round(x / 10.0**power, -last) + 0.0:.{max(0, -last)}f}" for x in (value, half))
     behind = f"·10{str(power).translate(RAISED)}" if power else ""
@@ -92,7 +92,7 @@ def in_sentence(text: str) -> str:
     Nor more than five digits before the point, but for what is counted.
     """
     plain = re.sub(EXPONENT, lambda m: f"{m[1]}·10{str(int(m[2])).translate(RAISED)}", text)
-    plain = re.sub(LONG, _in_powers, plain)
+    plain = re.sub(LONG_NUMBER, _in_powers, plain)
     return re.sub(r"\^(-?[0-9]+)", lambda m: m[1].translate(RAISED), plain.replace("+-", "±"))
 
 
@@ -112,7 +112,7 @@ def mass(unit: str) -> Scale:
         force, length = role_unit("force", wanted[1]), role_unit("displacement", wanted[2])
     except StudyError:  # counts
         return Scale(1.0, unit)
-    if (force.powers, length.powers) != (FORCE, LENGTH):  # volts
+    if (force.powers, length.powers) != (A_FORCE, A_LENGTH):  # volts
         return Scale(1.0, unit)
     return Scale(length.factor / force.factor, "kg")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.compare.comparison import Comparison
 from study.compare.dependence import explained_by_place
-from study.compare.force_map import FEWEST, surface
+from study.compare.force_map import FEWEST_VISITS, surface
 from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
@@ -19,7 +19,7 @@ from study.explore.words import in_words
 from study.figures.sketch import Link, Sketch, svg
 from study.support.numbers import percent
 
-TRIED = 8  # candidates that are named of one place
+NAMED_AS_TRIED = 8  # candidates of one place
 READ = "a dash: below zero; a dot: may be noise"
 UNSEEN = "No sensor shows this motion, too little of it is judged, or the difference there is noise."
 UNTIED = "The model ties nothing here, or no equation with it is measured."
@@ -28,7 +28,7 @@ UNTIED = "The model ties nothing here, or no equation with it is measured."
 def one_place(focus: Focus, seen: bool, tied: bool) -> dict[str, str]:
     """The fragments of the place that is looked at: whether its motion is ``seen``, and its stiffness known."""
     plane = surface(*focus.within).mean
-    short = f"no cell is visited {FEWEST} times: too short a record for a map"
+    short = f"no cell is visited {FEWEST_VISITS} times: too short a record for a map"
     unseen = "" if seen else UNSEEN
     return {
         "force-unit": escape(in_text(focus.force.unit)),
@@ -77,8 +77,8 @@ def _place(stage: Stage, link: Link, general: Mapping[frozenset[str], float], se
     rows = stage.diagnosis.candidates if stage.diagnosis is not None else ()
     own = [row for row in rows if row.entry.place.path == path]
     if own:
-        more = f"; {len(own) - TRIED} more" if len(own) > TRIED else ""
-        known.append("<p>Tried there: " + "; ".join(_tried(row) for row in own[:TRIED]) + f"{more}.</p>")
+        more = f"; {len(own) - NAMED_AS_TRIED} more" if len(own) > NAMED_AS_TRIED else ""
+        known.append("<p>Tried there: " + "; ".join(_tried(row) for row in own[:NAMED_AS_TRIED]) + f"{more}.</p>")
     elif stage.diagnosis is not None and path in shares:
         known.append("<p>No effect there explains enough to be fitted.</p>")
     label = escape(link.place.label)

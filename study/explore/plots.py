@@ -26,8 +26,8 @@ def response(s: Sources, time: Any) -> Any:
     drawn = theme.panel("response", 170, "", "response", select=True, ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
-    measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
-    predicted = drawn.line("t", "predicted", source=s["time"], **theme.PREDICTED)
+    measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED_LINE)
+    predicted = drawn.line("t", "predicted", source=s["time"], **theme.PREDICTED_LINE)
     theme.chosen(drawn, "box_response")
     theme.follows(drawn, [measured, predicted])
     theme.legend(drawn, [("measured", [measured]), ("free run of the model", [predicted])])
@@ -53,15 +53,15 @@ def difference(s: Sources, time: Any) -> Any:
 def close(s: Sources) -> Any:
     """The same where the model misses most, or where a stretch was selected."""
     drawn = theme.panel("close", 348, "time / s", "response", narrow=True)
-    measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED | {"line_width": 3.4})
-    predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED | {"line_width": 1.5})
+    measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED_LINE | {"line_width": 3.4})
+    predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED_LINE | {"line_width": 1.5})
     theme.legend(drawn, [("measured", [measured]), ("free run", [predicted])])
     return drawn
 
 
 def _blocks(drawn: Any, s: Sources) -> None:
     """The stretches of time in which a selected band or amplitude is at home."""
-    strips = VStrip(x0="left", x1="right", fill_color=theme.BAND, fill_alpha="weight", line_color=None)
+    strips = VStrip(x0="left", x1="right", fill_color=theme.AMBER, fill_alpha="weight", line_color=None)
     drawn.add_glyph(s["blocks"], strips, level="underlay", nonselection_glyph=None)
 
 
@@ -169,7 +169,7 @@ def plane(s: Sources) -> Any:
     drawn.add_glyph(s["plane"], outline, nonselection_glyph=None)
     bar = ColorBar(
         color_mapper=mapper, name="plane_bar", width=9, padding=4, background_fill_color=None,
-        major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.QUIET,
+        major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.GREY,
         label_standoff=4, bar_line_color=None, formatter=CustomJSTickFormatter(code=theme.EVEN),
     )  # fmt: skip
     drawn.add_layout(bar, "right")
@@ -232,12 +232,12 @@ def history(s: Sources, height: int) -> Any:
     return drawn
 
 
-HEIGHT = 228  # pixels
+PANEL_HEIGHT = 228  # pixels
 
 
 def loop(s: Sources, of: str) -> Any:
     """Force over the motion that was prescribed, measured and by the model."""
-    drawn = theme.panel(f"loop_{of}", HEIGHT, of, "force", narrow=True)
+    drawn = theme.panel(f"loop_{of}", PANEL_HEIGHT, of, "force", narrow=True)
     measured = drawn.scatter(of, "measured", source=s["loops"], size=3.2, fill_color="#a3adb7", line_color=None)
     predicted = drawn.scatter(of, "predicted", source=s["loops"], size=1.8, fill_color=theme.BLUE, line_color=None)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
@@ -246,7 +246,7 @@ def loop(s: Sources, of: str) -> Any:
 
 def cycles(s: Sources) -> Any:
     """Energy that each cycle takes, over its stroke."""
-    drawn = theme.panel("cycles", HEIGHT, "stroke", "energy", narrow=True)
+    drawn = theme.panel("cycles", PANEL_HEIGHT, "stroke", "energy", narrow=True)
     look: dict[str, Any] = {"source": s["cycles"], "line_width": 1.3}
     measured = drawn.scatter("stroke", "measured", size=6, fill_color="#a3adb7", line_color="#5c6873", **look)
     predicted = drawn.scatter("stroke", "predicted", marker="x", size=7, line_color=theme.BLUE, **look)
@@ -257,10 +257,10 @@ def cycles(s: Sources) -> Any:
 
 def decay(s: Sources, of: str, label: str) -> Any:
     """Frequency or damping ratio of a decay against its amplitude."""
-    drawn = theme.panel(f"decay_{of}", HEIGHT, "amplitude", label, x_axis_type="log")
+    drawn = theme.panel(f"decay_{of}", PANEL_HEIGHT, "amplitude", label, x_axis_type="log")
     bars = drawn.segment("at", f"{of}_low", "at", f"{of}_high", source=s["decay"], line_color="#5c6873", line_width=1.0)
     dots = drawn.scatter("at", of, source=s["decay"], size=5.5, fill_color="#a3adb7", line_color="#5c6873")
-    model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED)
+    model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED_LINE)
     drawn.x_range.range_padding = 0.06
     theme.legend(drawn, [("measured, 95 %", [dots, bars]), ("model", [model])])
     return drawn
@@ -269,11 +269,11 @@ def decay(s: Sources, of: str, label: str) -> Any:
 def magnitude(s: Sources, frequency: Any) -> Any:
     """Response over force, measured with its 95 % band and by the model."""
     drawn = theme.panel(
-        "frf", HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
+        "frf", PANEL_HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
     )
     band = drawn.varea("f", "low", "high", source=s["frf"], fill_color="#a3adb7", fill_alpha=0.35)
-    measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "predicted", source=s["frf"], **theme.PREDICTED)
+    measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.follows(drawn, [measured, predicted])
     theme.legend(drawn, [("measured, 95 %", [measured, band]), ("model", [predicted])])
     return drawn
@@ -282,10 +282,10 @@ def magnitude(s: Sources, frequency: Any) -> Any:
 def phase(s: Sources, frequency: Any) -> Any:
     """Its phase in degrees."""
     ranges = (frequency, theme.fixed("range_phase", -190.0, 190.0))
-    drawn = theme.panel("phase", HEIGHT, "frequency / Hz", "phase / °", narrow=True, ranges=ranges)
+    drawn = theme.panel("phase", PANEL_HEIGHT, "frequency / Hz", "phase / °", narrow=True, ranges=ranges)
     drawn.yaxis.ticker = [-180, -90, 0, 90, 180]
-    measured = drawn.line("f", "phase", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "phase_predicted", source=s["frf"], **theme.PREDICTED)
+    measured = drawn.line("f", "phase", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "phase_predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
     return drawn
 
@@ -293,16 +293,16 @@ def phase(s: Sources, frequency: Any) -> Any:
 def linearity(s: Sources, frequency: Any) -> Any:
     """Ordinary coherence of force and response: below one in both, the system is nonlinear; in one, noise or a lack."""
     ranges = (frequency, theme.fixed("range_linearity", 0.0, 1.03))
-    drawn = theme.panel("linearity", HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)
-    measured = drawn.line("f", "coherence", source=s["frf"], **theme.MEASURED)
-    predicted = drawn.line("f", "coherence_predicted", source=s["frf"], **theme.PREDICTED)
+    drawn = theme.panel("linearity", PANEL_HEIGHT, "frequency / Hz", "coherence / 1", narrow=True, ranges=ranges)
+    measured = drawn.line("f", "coherence", source=s["frf"], **theme.MEASURED_LINE)
+    predicted = drawn.line("f", "coherence_predicted", source=s["frf"], **theme.PREDICTED_LINE)
     theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
     return drawn
 
 
 def correlation(s: Sources, name: str, label: str) -> Any:
     """A correlation of the residual, with the 99 % band of what is noise."""
-    drawn = theme.panel(name, HEIGHT, "lag / s", label, narrow=True)
+    drawn = theme.panel(name, PANEL_HEIGHT, "lag / s", label, narrow=True)
     drawn.add_layout(Span(location=0.0, dimension="width", line_color=theme.AXIS, line_width=1.0))
     line = drawn.line("lag", "value", source=s[name], line_color=theme.ORANGE, line_width=1.3)
     band = drawn.multi_line("lag", "level", source=s[f"{name}_band"], **theme.NOISE)
@@ -313,7 +313,7 @@ def correlation(s: Sources, name: str, label: str) -> Any:
 
 def histogram(s: Sources) -> Any:
     """Distribution of the residual beside a normal one."""
-    drawn = theme.panel("histogram", HEIGHT, "difference / σ", "density / 1", narrow=True)
+    drawn = theme.panel("histogram", PANEL_HEIGHT, "difference / σ", "density / 1", narrow=True)
     bars = drawn.quad(
         left="left", right="right", top="top", bottom=0.0, source=s["histogram"], fill_color="#a3adb7",
         fill_alpha=0.6, line_color=None,

@@ -10,8 +10,8 @@ from study.explore.page_units import in_percent, in_text, number, with_error
 from study.explore.session import Stage
 from study.support.numbers import RARE, by_chance
 
-WAITING = "each record is being fitted by itself …"
-NOT_ASKED = "Not asked for here: <code>study compare</code> fits each record by itself."
+RECORDS_WAITING = "each record is being fitted by itself …"
+FITS_NOT_ASKED = "Not asked for here: <code>study compare</code> fits each record by itself."
 DIFFERS = (
     "p: the share of records in which chance alone would make a coefficient that is one and the same differ as much; "
     "p &lt; 0.001 is fewer than 1 of 1000."
@@ -75,12 +75,12 @@ def _levels(stage: Stage, live: bool) -> str:
     fitted = [c for c in stage.comparison.coefficients if not c.held]
     if found is None:  # as many rows, so that nothing moves when they come
         if not live:
-            return f"<p>{NOT_ASKED}</p>"
+            return f"<p>{FITS_NOT_ASKED}</p>"
         rows = "".join(
             f"<tr><th><i>{escape(_symbol(c.key))}</i><small>{escape(in_text(c.unit))}</small></th><td>&nbsp;</td></tr>"
             for c in fitted
         )
-        return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table><p>{DIFFERS}</p>"
+        return f"<table><tr><th></th><th>{RECORDS_WAITING}<small>&nbsp;</small></th></tr>{rows}</table><p>{DIFFERS}</p>"
     if not found.levels:
         return "<p>every coefficient is held</p>"
     forces = [number(force, 3) for force in found.levels[0].force]

@@ -20,7 +20,7 @@ from study.diagnose.confirmed_faults import Diagnosed
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.needless import Needless
 from study.equations import model_file
-from study.explore import html_page
+from study.explore import PAGE, html_page
 from study.explore.axis_scales import Columns
 from study.explore.html_page import ROOT, Page, template
 from study.explore.session import Session, Stage, begin_with, with_diagnosis, with_next_test, with_stage, worst
@@ -110,9 +110,6 @@ def _numbered(content: Any) -> tuple[Any, dict[str, str]]:
         return known.setdefault(item, f"e{len(known) + 1}") if isinstance(item, str) else walk(item)
 
     return walk(content), known
-
-
-PAGE = "explore.html"
 
 
 def files(

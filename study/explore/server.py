@@ -20,8 +20,8 @@ from study.explore.live import Watcher
 from study.support.errors import StudyError
 
 HOST = "127.0.0.1"
-USUAL = 5006
-LARGEST = 1_000_000  # bytes of a request: a page sends none
+USUAL_PORT = 5006
+LARGEST_REQUEST = 1_000_000  # bytes: a page sends none
 AGAIN = 5.0  # seconds after a visit in which its page is drawn, before one is made for the next
 DAY = 86400  # seconds within which a page that was fetched must open its socket
 
@@ -62,7 +62,7 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
 def _bound(application: Application, port: int | None) -> tuple[BaseServer, int]:
     """A server, and the port that it has."""
     try:
-        return _server(application, USUAL if port is None else port)
+        return _server(application, USUAL_PORT if port is None else port)
     except OSError as error:
         if error.errno not in (errno.EADDRINUSE, errno.EACCES):
             raise
@@ -77,6 +77,6 @@ def _server(application: Application, port: int) -> tuple[BaseServer, int]:
         {"/": application}, bound, secrets.token_hex(32).encode(), session_token_expiration=DAY,
         check_unused_sessions_milliseconds=1000, unused_session_lifetime_milliseconds=2000,
     )  # fmt: skip
-    http = HTTPServer(guarded, max_body_size=LARGEST)
+    http = HTTPServer(guarded, max_body_size=LARGEST_REQUEST)
     http.add_sockets(sockets)
     return BaseServer(IOLoop.current(), guarded, http), bound

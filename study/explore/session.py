@@ -40,7 +40,7 @@ from study.support.errors import StudyError, expect
 from study.support.extras import undrawn
 
 Step = dict[str, Any]
-SHOWN = 12  # candidates
+ON_THE_PAGE = 12  # candidates
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class ByRecord:
     why_not: str = ""  # the sentence on a record to which the model alone cannot be fitted
 
 
-NONE = Several()
+NO_OTHERS = Several()
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Stage:
         """What a page lists: sets of effects, the best single ones, and all of the user's own."""
         rows = self.diagnosis.candidates if self.diagnosis is not None else ()
         sets = [r for r in self.diagnosis.sets if len(r.entries) > 1] if self.diagnosis is not None else []
-        return (*sets[:SHOWN], *rows[:SHOWN], *(r for r in rows[SHOWN:] if is_own(r.term)))
+        return (*sets[:ON_THE_PAGE], *rows[:ON_THE_PAGE], *(r for r in rows[ON_THE_PAGE:] if is_own(r.term)))
 
     @property
     def values(self) -> dict[str, float]:
@@ -108,7 +108,7 @@ class Session:
     stages: tuple[Stage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
-    several: Several = NONE
+    several: Several = NO_OTHERS
 
     @property
     def now(self) -> Stage:
@@ -134,7 +134,7 @@ def begin(model: Model, prepared: Prepared, *, earlier: Sequence[Step] = ()) -> 
 
 
 def begin_with(
-    accounted: Accounted, *, earlier: Sequence[Step] = (), several: Several = NONE, known: ByRecord | None = None
+    accounted: Accounted, *, earlier: Sequence[Step] = (), several: Several = NO_OTHERS, known: ByRecord | None = None
 ) -> Session:
     """A session with the model as it was compared, on the record, or records, as corrected for that.
 

@@ -18,17 +18,17 @@ from bokeh.models.tools import BoxSelectTool, PanTool, ResetTool, SaveTool, Whee
 from bokeh.plotting import figure
 
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
-INK, QUIET, RULE, AXIS = "#1f2933", "#5c6873", "#e4e7eb", "#9aa5b1"
+INK, GREY, GRID, AXIS = "#1f2933", "#5c6873", "#e4e7eb", "#9aa5b1"
 BLUE, ORANGE = "#0b5394", "#d1600a"
-MEASURED: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
-PREDICTED: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
+MEASURED_LINE: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
+PREDICTED_LINE: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
 DIFFERENCE: dict[str, Any] = {"line_color": ORANGE, "line_width": 1.0}
 NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
 PINNED: dict[str, Any] = {"line_color": "#1b6e3c", "line_width": 1.7, "line_dash": [7, 3]}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
-BAND = "#f5c04a"
-POWERS = """
+AMBER = "#f5c04a"
+TICKS_IN_POWERS = """
 const power = Math.floor(Math.log10(tick) + 1e-9), mantissa = Number((tick / 10 ** power).toPrecision(2))
 if (power >= -2 && power <= 3) return String(Number(tick.toPrecision(3)))
 const raised = String(power).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻")
@@ -76,11 +76,11 @@ def panel(
     for side, axis in (("x", drawn.xaxis[0]), ("y", drawn.yaxis[0])):
         if more.get(f"{side}_axis_type") == "log":
             axis.ticker = FixedTicker(name=f"{name}_ticks", ticks=[], minor_ticks=[])
-            axis.formatter = CustomJSTickFormatter(code=POWERS)
+            axis.formatter = CustomJSTickFormatter(code=TICKS_IN_POWERS)
         elif isinstance(axis.formatter, BasicTickFormatter):
             axis.formatter = CustomJSTickFormatter(code=EVEN)
     for grid in drawn.grid:
-        grid.grid_line_color = RULE
+        grid.grid_line_color = GRID
     return drawn
 
 
@@ -89,7 +89,7 @@ def _axis(axis: Any, name: str) -> None:
     axis.axis_label_text_font = axis.major_label_text_font = FONT
     axis.axis_label_text_font_style = "normal"
     axis.axis_label_text_font_size, axis.major_label_text_font_size = "12px", "11px"
-    axis.axis_label_text_color, axis.major_label_text_color = INK, QUIET
+    axis.axis_label_text_color, axis.major_label_text_color = INK, GREY
     axis.axis_label_standoff = 4
     axis.axis_line_color = axis.major_tick_line_color = AXIS
     axis.minor_tick_line_color = None
@@ -126,7 +126,7 @@ def _item(label: Any, renderers: list[Any], panel: str) -> LegendItem:
 def chosen(drawn: Any, name: str) -> BoxAnnotation:
     """The range that was selected in a panel, hidden until there is one."""
     box = BoxAnnotation(
-        name=name, visible=False, fill_color=BAND, fill_alpha=0.35, line_color="#8a6d00", line_dash="dashed",
+        name=name, visible=False, fill_color=AMBER, fill_alpha=0.35, line_color="#8a6d00", line_dash="dashed",
         line_width=1.0, level="underlay", propagate_hover=True,
     )  # fmt: skip
     drawn.add_layout(box)

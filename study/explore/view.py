@@ -24,7 +24,7 @@ from study.diagnose.ranked import Ranked
 from study.equations.coefficient_units import units_at
 from study.equations.place import HERE, Place
 from study.explore import axes, check_columns, decimate, place_words, record_words, words
-from study.explore.axis_scales import LEAST, Columns, Focus, heard, rms_force, within
+from study.explore.axis_scales import LEAST_FORCE, Columns, Focus, heard, rms_force, within
 from study.explore.check_columns import NINETY_FIVE
 from study.explore.page_units import in_text, power
 from study.explore.session import Session, Stage, on_record
@@ -36,7 +36,7 @@ from study.support.arrays import Floats
 DASH = 5.0  # pixels
 DASHES = ("solid", "dashed", "dotdash", "dotted", "dashdot")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#333333", "#E69F00")
-SURE = 2.0  # standard errors: cells whose mean is below may be noise
+SURE_CELL = 2.0  # standard errors: cells whose mean is below may be noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ class View:
         comparison, place = self.stage.comparison, self.places[label]
         focus = self.focus(self.sensors[0], label)
         u, v, missing = focus.within
-        least = LEAST * rms_force(comparison) / focus.force.factor
+        least = LEAST_FORCE * rms_force(comparison) / focus.force.factor
         stiffness = self.stiffnesses.get(place.path)
         largest = 1.0 if stiffness is None else float(np.max(np.abs(stiffness.model), initial=0.0))
         scale = power("/".join(units_at(place, comparison.record)), largest)
@@ -327,7 +327,7 @@ def _plane(focus: Focus) -> Columns:
         "found": mean,  # which stays when a candidate is previewed
         "below": np.where(missing < -tiny, DASH, 0.0),
         "seen": np.where(np.isfinite(mean), 1.0, 0.0),
-        "unsure": np.where(np.abs(missing) < SURE * plane.error.ravel(), 3.0, 0.0),
+        "unsure": np.where(np.abs(missing) < SURE_CELL * plane.error.ravel(), 3.0, 0.0),
         "picked": np.zeros(len(mean)),
     }  # fmt: skip
 

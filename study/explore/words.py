@@ -26,19 +26,19 @@ from study.support.arrays import Floats
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
-VERDICTS = {
+VERDICT_HEADINGS = {
     MISSING: "An effect is missing", SEVERAL: "Several effects are missing", NOTHING: "Nothing is missing",
     PARTLY_KNOWN: "Effects are missing, and something that has no name",
 }  # fmt: skip
-UNKNOWN = "Something is missing that no candidate explains"
+UNKNOWN_HEADING = "Something is missing that no candidate explains"
 WAITING = "Candidates are being tried …"
-NOT_ASKED = (
+DIAGNOSIS_NOT_ASKED = (
     "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
 )
-PREDICTED = "The model runs free under the measured force, on the part of the record that it was not fitted to."
-LONG = 8  # characters of a large number
-FLOOR = "From the quietest bands of what is left, or from what differs between periods."
-FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
+ABOUT_ERROR = "The model runs free under the measured force, on the part of the record that it was not fitted to."
+MANY_CHARACTERS = 8  # of a large number
+ABOUT_FLOOR = "From the quietest bands of what is left, or from what differs between periods."
+ABOUT_FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
 SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
@@ -101,9 +101,9 @@ def _figures(comparison: Comparison) -> str:
         most = max(comparison.forces, key=lambda force: force.total)
         unexplained += f"; worst {in_percent(most.total)} at {most.coordinate}"
     cells = (
-        ("error", "Error of the response", in_percent(prediction.error), about, PREDICTED),
-        ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", FLOOR),
-        ("force", "Error of the force", in_percent(comparison.force_error), unexplained, FORCE),
+        ("error", "Error of the response", in_percent(prediction.error), about, ABOUT_ERROR),
+        ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain", ABOUT_FLOOR),
+        ("force", "Error of the force", in_percent(comparison.force_error), unexplained, ABOUT_FORCE),
     )
     told = cells if comparison.forces else cells[:-1]  # modes have no equation
     return "".join(_figure(*cell) for cell in told)
@@ -111,7 +111,7 @@ def _figures(comparison: Comparison) -> str:
 
 def _figure(key: str, title: str, value: str, about: str, meaning: str) -> str:
     """One of the large numbers, small enough for its place where it has many digits."""
-    size = " class='long'" if len(value) > LONG else ""
+    size = " class='long'" if len(value) > MANY_CHARACTERS else ""
     return (
         f'<div class="figure" id="figure-{key}" title="{escape(meaning)}"><span>{title}</span><b{size}>{value}</b>'
         f"<small>{escape(about)}</small></div>"
@@ -120,8 +120,8 @@ def _figure(key: str, title: str, value: str, about: str, meaning: str) -> str:
 
 def _verdict(stage: Stage, live: bool) -> str:
     if stage.diagnosis is None:
-        return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
-    head = VERDICTS.get(stage.diagnosis.verdict, UNKNOWN)
+        return f"<p class='waiting'>{WAITING if live else DIAGNOSIS_NOT_ASKED}</p>"
+    head = VERDICT_HEADINGS.get(stage.diagnosis.verdict, UNKNOWN_HEADING)
     return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(in_sentence(stage.said))}</p>"
 
 

@@ -52,7 +52,7 @@ def fmu(made: Exported, step: float | None = None) -> bytes:
     files = {
         "modelDescription.xml": _description(made, motion, name, guid, step),
         "resources/motion.bin": guid.encode().ljust(40, b"\0") + program,
-        f"binaries/{_platform()}/{name}{kernels.LIBRARY.suffix}": kernels.compiled_library().read_bytes(),
+        f"binaries/{_platform()}/{name}{kernels.COMPILED.suffix}": kernels.compiled_library().read_bytes(),
     }
     files |= {f"sources/{path.name}": path.read_bytes() for path in sorted(kernels.SOURCES.iterdir())}
     written = io.BytesIO()

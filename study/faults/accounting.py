@@ -17,7 +17,7 @@ from study.faults.force_noise import force_noise
 from study.faults.leftover import amounts_on_both, gained, leaves_less, leftover, refitted, share
 from study.faults.search import (
     FAR_APART,
-    PLAIN,
+    UNLIKE_PHYSICS,
     Asked,
     Refined,
     SearchEnd,
@@ -192,7 +192,7 @@ def _corrected(
         promised = promised_changes(fit, fewer, fit.model.terms) if changes and not lost else None
         put_off = promised is not None and promised.alone
         if put_off:
-            told = tuple(one for one in told if one[0] in PLAIN)
+            told = tuple(one for one in told if one[0] in UNLIKE_PHYSICS)
         end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
         if not put_off:
             end = _beneath_too(model, prepared, fit, faults, asked, end)

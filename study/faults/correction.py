@@ -16,9 +16,9 @@ from study.records.prepared import Prepared, prepare_record
 from study.records.states import angular_rate
 from study.support.arrays import Bools, Floats
 
-FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
+FIRST_CUTOFF = 0.02  # of the motion's own frequency: where a high-pass is first looked for
 STIRRED = 0.05  # samples by which a force is moved to see what a delay of it does
-BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
+ALSO_LOST = 2  # samples on either side of lost ones that a channel which is moved in time loses too
 
 
 def unit_of(fault: str, response_unit: str) -> str:
@@ -52,7 +52,7 @@ def _own_columns(fault: str, left: SensorResidual, value: float) -> Columns:
         return (fitted * first / last)[:, None], (judged * second / last)[:, None]
     if fault == DELAY:
         return left.by_late_reading
-    cutoff = value or FIRST * angular_rate(fitted, dt) / (2.0 * np.pi)
+    cutoff = value or FIRST_CUTOFF * angular_rate(fitted, dt) / (2.0 * np.pi)
     fall = np.exp(-2.0 * np.pi * cutoff * dt * np.arange(len(fitted)))
     first, second = left.changed(lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
     return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
@@ -126,7 +126,7 @@ def _without_faults(faults: Sequence[Fault], values: Floats, dt: float) -> tuple
                     values = values - fault.waveform
     late = sum(abs(fault.value) for fault in faults if fault.fault == DELAY)
     if late and np.any(lost):
-        lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + BESIDE) + 1), "same") > 0.5
+        lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + ALSO_LOST) + 1), "same") > 0.5
     return values, lost
 
 

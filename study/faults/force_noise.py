@@ -23,14 +23,14 @@ from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
-ROUNDS = 100  # of Fisher's scoring, at most
+SCORING_ROUNDS = 100  # of Fisher's, at most
 HALVINGS = 14  # of one step, at most
-RUNS = 32  # of the model with noise on its force
+NOISY_RUNS = 32  # of the model, with noise on its force
 LITTLE = 0.01  # of the force: the noise of the first runs, those that follow have what was found
 REPEATS = 5  # of the runs, until size and colour of the noise no longer change
 FADED = 0.1  # of a part of a record at either end
-KEPT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
-LINES = 5  # of a spectrum, over which the mean of these runs is taken
+INDEPENDENT = (1.0 - 1.25 * FADED) ** 2 / (1.0 - 93.0 / 64.0 * FADED)  # of the lines are independent then
+LINES_IN_MEAN = 5  # of a spectrum, over which the mean of these runs is taken
 SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 
 
@@ -65,12 +65,13 @@ def force_noise(left: FittedResidual, forces: Sequence[str], asked: int, repeats
     on_responses = sum(
         min(_likely(own[:, None], _first_order(memory, turn)[:, None]).cost for memory in MEMORIES) for own in power.T
     )
-    likely = [(name, _on_force(left, name, power, turn, on_responses - np.log(asked / ALPHA) / KEPT, repeats))
+    likely = [(name, _on_force(left, name, power, turn, on_responses - np.log(asked / ALPHA) / INDEPENDENT, repeats))
               for name in forces]  # fmt: skip
     name, found = min(likely, key=lambda one: min((noise.cost for noise in one[1]), default=np.inf))
     if not found:
         return None
-    costs = KEPT * np.array([noise.cost for noise in found])  # the rms is that of all colours by how likely each is
+    # the rms is that of all colours by how likely each is
+    costs = INDEPENDENT * np.array([noise.cost for noise in found])
     weights = np.exp(np.min(costs) - costs)
     weights /= float(np.sum(weights))
     sizes, errors = np.array([noise.rms for noise in found]), np.array([noise.error_of_rms for noise in found])
@@ -126,7 +127,7 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
         return None
 
     drawn = list[Mapping[str, Any]]()  # where the numbers of each run begin: all of them would fill the memory
-    for _ in range(RUNS):
+    for _ in range(NOISY_RUNS):
         drawn.append(rng.bit_generator.state)
         rng.standard_normal(len(record))
     total, count = np.zeros(0), 0
@@ -135,7 +136,7 @@ def _passed(left: FittedResidual, force: str, memory: float, size: float) -> Flo
             total, count = total + found if count else found, count + 1
     if not count:
         return None
-    near, whole = np.ones(LINES), np.ones(len(total))
+    near, whole = np.ones(LINES_IN_MEAN), np.ones(len(total))
     beside = np.convolve(whole, near, "same")
     smooth = [np.convolve(own, near, "same") / beside for own in (total / count).T]
     # of a periodogram that scatters as a chi squared of two degrees of freedom
@@ -168,7 +169,7 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
     columns, spectra = np.column_stack([shape.T.ravel() / level, own]), power.T.ravel()
     amounts = 0.5 * np.concatenate([[np.mean(mean)], mean])
     cost = _cost(columns @ amounts, spectra)
-    for _ in range(ROUNDS):
+    for _ in range(SCORING_ROUNDS):
         expected = columns @ amounts
         step = least_squares(columns / expected[:, None], spectra / expected) - amounts
         tried = [np.maximum(amounts + step / 2**k, SHRINKING * amounts) for k in range(HALVINGS)]
@@ -185,7 +186,7 @@ def _likely(power: Floats, shape: Floats) -> _Noise:
     between = np.asarray(np.sum(coherent, axis=0), dtype=np.float64)
     together = between.T @ between - np.einsum("ilp,ilq->pq", coherent, coherent)
     variance = inverse + inverse @ together @ inverse  # never below that of spectra that tell of nothing in common
-    error = float(np.sqrt(max(variance[0, 0], inverse[0, 0]) / KEPT))
+    error = float(np.sqrt(max(variance[0, 0], inverse[0, 0]) / INDEPENDENT))
     return _Noise(float(amounts[0]) / level, error / level, cost, float(amounts[0]))
 
 

@@ -30,11 +30,11 @@ from study.support.statistics import Gain, clustered_covariance, gain, gain_besi
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
-INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
-SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
-FITTED = 5  # effects of the largest linear share that are fitted
-CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
-RUNS = 20  # free runs of such a fit
+IMITATED = 1e-5  # share of a column's length that the model's own coefficients leave of it
+LONGEST_LOOK = 8192  # samples in which effects are searched for
+STRONGEST = 5  # effects, by their linear share, that are fitted
+AS_GOOD = 2.0  # standard errors by which one effect may leave more than another and be as good
+FIT_RUNS = 20  # free runs of the fit of such an effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +276,7 @@ def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Shar
     fitted, judged = left.known(columns)
     taken = left.taking[0] @ fitted
     alone = fitted - left.own[0] @ taken
-    if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
+    if np.any(np.linalg.norm(alone, axis=0) <= IMITATED * np.linalg.norm(fitted, axis=0)):
         return None
     change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
     whole, covariance = amounts_on_both(left, columns)
@@ -354,7 +354,9 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
-    look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
+    look = prepared.shortened(
+        int(np.clip(prepared.samples_in(shape_search.SEARCH_PERIODS), shape_search.SEARCH_SAMPLES, LONGEST_LOOK))
+    )
     entries = candidate_entries(fit.model, turning=prepared.record.rotations)
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
@@ -367,7 +369,12 @@ def missing(left: FittedResidual) -> FittedResidual | None:
             near = with_term(base, *begun)
             initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
             fit = fit_part(
-                near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
+                near.model,
+                prepared,
+                base.fit.held,
+                steps=near.steps_per_sample,
+                max_iterations=FIT_RUNS,
+                initial=initial,
             )
         except StudyError:
             return None
@@ -375,12 +382,12 @@ def missing(left: FittedResidual) -> FittedResidual | None:
 
     begins = side_by_side(lambda e: shape_search.shape_starts(e, base), entries, lambda e: e.term.effort)
     starts = [(entry, found) for entry, found in zip(entries, begins, strict=True) if found]
-    promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
+    promising = sorted(starts, key=lambda s: -s[1][0].share)[:STRONGEST]
     tried = [t for t in side_by_side(fitted, promising, lambda begun: begun[0].term.effort) if t is not None]
     for group in ([t for t in tried if not unphysical(t, left)], tried):
         if group:  # of those that chance may make worse than the best, the one with the fewest unknowns
             best = min(group, key=lambda t: float(np.sum(t.residual[1] ** 2)))
-            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
+            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < AS_GOOD]
             simplest = min(level, key=lambda t: (len(t.fit.keys), t is not best))
             if leaves_less(left, simplest, len(entries)):
                 return simplest

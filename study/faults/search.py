@@ -55,15 +55,15 @@ from study.records.prepared import Prepared, limited
 from study.support.errors import expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
-SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
+LEAST_COMPETING, MOST_COMPETING = 8192, 16384  # samples of either part in which faults compete with physics
 Asked = tuple[str, str]  # a fault and the channel in which it is looked for
 ROUNDS = 12  # faults and effects looked for one after the other
-PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
+UNLIKE_PHYSICS = (DRIFT, SPIKES, DROP_OUTS)  # no physics imitates them
 EFFECTS = 3  # of the library that are added before a fault is believed
-STEPS = 8  # of Gauss and Newton
+GAUSS_NEWTON_STEPS = 8
 OF_MOTION = 0.5  # of what is left: where so much depends on the motion, a force is missing rather than noisy
 FAR_APART = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
-NEAR = 0.05  # standard errors: as near the value as the search has to come
+REACHED = 0.05  # standard errors: as near the value as the search has to come
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def first_faults(prepared: Prepared, held: Mapping[Asked, float], asked: Sequenc
 
 def searched_part(given: Prepared) -> Prepared:
     """As much of either part of a record as a search for faults that compete with physics takes."""
-    return limited(given, int(np.clip(given.samples_in(shape_search.PERIODS), SHORT, LONG)))
+    return limited(given, int(np.clip(given.samples_in(shape_search.SEARCH_PERIODS), LEAST_COMPETING, MOST_COMPETING)))
 
 
 def search_faults(
@@ -181,9 +181,9 @@ def search_faults(
     near = fit if look is given else refitted(fit, corrected(look, faults))
     stage = None if near is None else _searched(look, near, near, faults, asked)
     if stage is not None and look is not given:
-        known = tuple(f for f in stage.faults if f.fault not in PLAIN)
+        known = tuple(f for f in stage.faults if f.fault not in UNLIKE_PHYSICS)
         left, rich = (refitted(one.fit, corrected(given, known)) for one in (stage.left, stage.rich))
-        plain = tuple(one for one in asked if one[0] in PLAIN)
+        plain = tuple(one for one in asked if one[0] in UNLIKE_PHYSICS)
         stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
         stage = None if stage is None else _values_again(stage)
     if stage is None:
@@ -230,7 +230,7 @@ def _next(stage: SearchStage, asked: Sequence[Asked]) -> SearchStage | None:
     found = [(f.fault, f.channel) for f in stage.faults]
     open_ones = [one for one in asked if one not in found or one[0] in (HUM, SPIKES)]
     plain = _plain(stage, open_ones, len(asked))
-    if plain is not None or all(name in PLAIN for name, _ in asked):
+    if plain is not None or all(name in UNLIKE_PHYSICS for name, _ in asked):
         return plain
     tied = [(f.fault, f.channel) for f in stage.faults if f.rivals]
     return _contested(stage, [one for one in open_ones if one not in tied], len(asked))
@@ -415,7 +415,7 @@ def refined(
     before, unit = left, unit_of(name, given.record.units.get(channel, ""))
     if name == DELAY and value == 0.0:
         value, left = _coarse(channel, given, faults, left)
-    for _ in range(STEPS):
+    for _ in range(GAUSS_NEWTON_STEPS):
         amounts, covariance = amounts_on_both(left, fault_columns(name, channel, left, value))
         step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
         value += step
@@ -425,7 +425,7 @@ def refined(
         if one is None:
             return None
         left = one.left
-        if abs(step) <= NEAR * error:
+        if abs(step) <= REACHED * error:
             break
     if left.relative_power >= before.relative_power:
         return None

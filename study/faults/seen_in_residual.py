@@ -20,14 +20,14 @@ from study.support.arrays import Bools, Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
 
 SLOWEST, NEXT = 8, 32  # cosines, of half a period each more than the one before, that are held against the next
-FEWEST = 256  # samples that show both
+ENOUGH_SAMPLES = 256  # to show both
 HARMONICS = tuple(sorted(n * mains for n in range(1, 7) for mains in (50.0, 60.0)))  # of the mains, in hertz
 WANDER = 1e-3  # share by which the mains' frequency wanders
-BESIDE = 24  # lines on either side that a line is held against
+LINES_BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 DRIFTING = 12  # lines from zero that are drift, not hum
-NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
-ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
+SAMPLES_BESIDE = 8  # on either side, that tell how much a sample differs from its own two neighbours
+SPIKE_ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
 def drift(left: SensorResidual, asked: int) -> Fault | None:
@@ -73,7 +73,7 @@ def mean_response(prepared: Prepared, channel: str) -> Fault:
 
 def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     """How many of the slowest lines stand above the next, and the mean power of these; None without any."""
-    if len(values) < FEWEST:
+    if len(values) < ENOUGH_SAMPLES:
         return None
     lines = np.asarray(dct(values, norm="ortho"), dtype=np.float64)
     if _p_value(lines, 1, SLOWEST, NEXT) * asked >= ALPHA:
@@ -151,10 +151,10 @@ def _strongest_line(left: SensorResidual, level: float) -> float | None:
     residual = left.both
     n = len(residual)
     power = np.abs(np.asarray(rfft(residual * np.hanning(n)))) ** 2
-    if len(power) < 4 * BESIDE:
+    if len(power) < 4 * LINES_BESIDE:
         return None
-    kernel = np.ones(2 * BESIDE + 1)
-    kernel[BESIDE - NEAREST : BESIDE + NEAREST + 1] = 0.0
+    kernel = np.ones(2 * LINES_BESIDE + 1)
+    kernel[LINES_BESIDE - NEAREST : LINES_BESIDE + NEAREST + 1] = 0.0
     count = np.convolve(np.ones_like(power), kernel, "same")
     level_beside = np.convolve(power, kernel, "same") / count
     ratio = power / np.maximum(level_beside, np.finfo(float).tiny)
@@ -230,9 +230,9 @@ def _isolated(residual: Floats, known: Bools, level: float) -> Bools:
     as spikes, for two may be neighbours.
     """
     found = np.zeros(len(residual), dtype=bool)
-    if len(residual) < 4 * NEIGHBOURS:
+    if len(residual) < 4 * SAMPLES_BESIDE:
         return found
-    for _ in range(ROUNDS):
+    for _ in range(SPIKE_ROUNDS):
         usable = known & ~found
         whole = usable & np.roll(usable, 1) & np.roll(usable, -1)
         whole[[0, -1]] = False
@@ -258,8 +258,8 @@ def _single(bend: Floats) -> Bools:
 
 def _spread(bend: Floats, whole: Bools) -> tuple[Floats, Floats]:
     """Standard deviation of the bends about each sample, the nearest two left out, and their number, shapes (n,)."""
-    kernel = np.ones(2 * NEIGHBOURS + 1)
-    kernel[NEIGHBOURS - 2 : NEIGHBOURS + 3] = 0.0
+    kernel = np.ones(2 * SAMPLES_BESIDE + 1)
+    kernel[SAMPLES_BESIDE - 2 : SAMPLES_BESIDE + 3] = 0.0
     middle = 1.4826 * float(np.median(np.abs(bend[whole]))) if np.any(whole) else 0.0
     near = np.clip(np.abs(bend), 0.0, 5.0 * middle) if middle > 0.0 else bend  # another spike nearby is no measure
     count = np.convolve(whole, kernel, "same")

@@ -17,7 +17,7 @@ from study.figures.curves import InputResponse, ResponseCurve
 from study.figures.styles import EXACT, look
 from study.support.arrays import Complexes, Floats
 
-BAND: dict[str, Any] = {"alpha": 0.22, "linewidth": 0.0}
+SHADED: dict[str, Any] = {"alpha": 0.22, "linewidth": 0.0}
 OPPOSITE = "opposite sign"
 Part = Callable[[Complexes], Floats]
 
@@ -142,7 +142,7 @@ def _size(axes: Axes, curve: ResponseCurve, size: Floats) -> None:
 def _curve(axes: Axes, curve: ResponseCurve, values: Floats, low: Floats, high: Floats) -> None:
     """Values of a curve and a band about them, in the estimator's look."""
     style = look(curve.estimator)
-    axes.fill_between(curve.frequency, low, high, color=style.colour, zorder=style.level - 1.0, **BAND)
+    axes.fill_between(curve.frequency, low, high, color=style.colour, zorder=style.level - 1.0, **SHADED)
     axes.plot(curve.frequency, values, **style.line)
 
 

@@ -9,11 +9,11 @@ from study.equations import dimensions, formulas, terms
 if TYPE_CHECKING:
     import pandas as pd
 
-PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+SHOWN_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz", "velocity": "m/s"}
 FREE_SHAPE = "miso_free_shape"  # the estimator that finds shape parameters too
 MOST_DIGITS = 6
-LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in brackets
+LOOSE_OPERATORS = (ast.Add, ast.Sub)  # whose operands a product must put in brackets
 
 
 def formula(text: str) -> str:
@@ -59,7 +59,7 @@ def _symbol(name: str) -> str:
 
 def _bracketed(tree: ast.expr, *more: type[ast.operator]) -> str:
     inner = _math(tree)
-    return f"({inner})" if isinstance(tree, ast.BinOp) and isinstance(tree.op, (*LOOSE, *more)) else inner
+    return f"({inner})" if isinstance(tree, ast.BinOp) and isinstance(tree.op, (*LOOSE_OPERATORS, *more)) else inner
 
 
 def response_unit(shape: str, force: str = "N", length: str = "m") -> str:
@@ -87,7 +87,7 @@ def prefixed(unit: str, largest: float) -> tuple[float, str]:
     """
     if unit != "m" or not largest > 0.0:
         return 1.0, unit
-    scale, prefix = next((p for p in PREFIXES if largest >= p[0]), PREFIXES[-1])
+    scale, prefix = next((p for p in SHOWN_PREFIXES if largest >= p[0]), SHOWN_PREFIXES[-1])
     return scale, prefix + unit
 
 

@@ -23,7 +23,7 @@ from matplotlib.textpath import TextToPath
 from study.support.errors import StudyError
 from study.support.files import replace_file
 
-LEFT, BOTTOM, TITLE, GAP = 0.88, 0.55, 0.58, 0.34  # inches
+LEFT, BOTTOM, TITLE_ROOM, GAP = 0.88, 0.55, 0.58, 0.34  # inches
 WIDTH, WIDE = 6.4, 7.2  # inches
 TEXT_TO_PATH = TextToPath()
 METADATA = {
@@ -50,7 +50,7 @@ def empty_page(
     to leave between title and panels, ``headed`` whether the first panels have headings of their own, which need room,
     ``share`` whether the panels of a column share their abscissa.
     """
-    top = TITLE + 0.21 * legend_rows + (GAP if headed else GAP / 2.0)
+    top = TITLE_ROOM + 0.21 * legend_rows + (GAP if headed else GAP / 2.0)
     between = GAP if share else GAP + BOTTOM - 0.1
     height = top + rows * panel + (rows - 1) * between + BOTTOM
     figure = Figure(figsize=(width, height))
@@ -99,7 +99,7 @@ def shared_legend(figure: Figure, axes: Sequence[Axes], columns: int | None = No
     if bands:
         entries["95 % band"] = Patch(facecolor="0.8", edgecolor="none")
     width, height = figure.get_size_inches()
-    anchor = ((LEFT - 0.04) / width, 1.0 - TITLE / height)
+    anchor = ((LEFT - 0.04) / width, 1.0 - TITLE_ROOM / height)
     shown = figure.legend(
         list(entries.values()), list(entries), loc="upper left", bbox_to_anchor=anchor,
         ncols=columns or -(-len(entries) // rows_for(len(entries))), borderaxespad=0.0, borderpad=0.0, labelspacing=0.3,

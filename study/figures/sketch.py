@@ -13,7 +13,7 @@ from study.equations.model import Model
 from study.equations.place import GROUND, Place
 from study.support.numbers import percent
 
-HIGH, STEP, GROUND_AT = 0.6, 1.9, -1.35
+HIGH, SPACING, GROUND_AT = 0.6, 1.9, -1.35
 SIDE, HATCH = 1.1, 0.16  # room beside the outer boxes; height of the ground
 SEEN = 0.01  # share from which a connection's is written beside it
 UNIT = 84.0  # pixels in the width of a box
@@ -68,7 +68,7 @@ class Sketch:
 
 def sketch(model: Model, measured: Sequence[str], shares: Mapping[frozenset[str], float]) -> Sketch:
     """The sketch of a structure; ``shares`` by what a place lies between, nothing where there is none."""
-    at = {name: STEP * i for i, name in enumerate(model.coordinates)}
+    at = {name: SPACING * i for i, name in enumerate(model.coordinates)}
     boxes = tuple(
         Box(name, x, 0.0, tuple(f for f, where in model.forces if where == name), name in measured)
         for name, x in at.items()
@@ -89,7 +89,7 @@ def _link(place: Place, at: Mapping[str, float], tied: bool, share: float) -> Li
         begin, end = (at[name], -0.5 * HIGH), (at[name], GROUND_AT)
         return Link(place, begin, (at[name], 0.5 * (begin[1] + end[1])), end, tied, share)
     left, right = sorted(at[name] for name in place.moving)
-    apart = round((right - left) / STEP)
+    apart = round((right - left) / SPACING)
     if apart == 1:
         begin, end = (left + 0.5, 0.0), (right - 0.5, 0.0)
         return Link(place, begin, (0.5 * (left + right), 0.0), end, tied, share)

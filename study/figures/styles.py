@@ -35,7 +35,7 @@ class LineLook:
 
 
 EXACT = LineLook("exact", "black", "-", 0.8, 5.0)
-ESTIMATORS = {
+ESTIMATOR_LOOKS = {
     "miso": LineLook("MI/SO", "C0", "-", 2.0, 3.0),
     "siso": LineLook("SI/SO", "C1", (0, (5.0, 2.0)), 1.7, 3.8),
     "local_polynomial": LineLook("local polynomial", "C2", (0, (7.0, 1.5, 1.5, 1.5)), 1.6, 3.5),
@@ -48,10 +48,10 @@ ESTIMATORS = {
 def look(estimator: str) -> LineLook:
     """The look of an estimator; one that the table does not know is drawn dash-dotted in sky blue."""
     fallback = LineLook(estimator.replace("_", " "), "C4", "-.", 1.6, 3.8)
-    return ESTIMATORS.get(estimator, fallback)
+    return ESTIMATOR_LOOKS.get(estimator, fallback)
 
 
 def legend_place(estimator: str) -> int:
     """Place of an estimator in legends: as in the table above, unknown ones last."""
-    names = list(ESTIMATORS)
+    names = list(ESTIMATOR_LOOKS)
     return names.index(estimator) if estimator in names else len(names)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from study.compare import history
+from study.diagnose import MISSING, NOTHING
 from study.support import document
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
@@ -19,7 +20,6 @@ from study.support.errors import StudyError, expect
 from study.support.files import read_text
 from study.support.numbers import percent
 
-TITLE = "Measured records"
 PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "history.png": "every model of the climb and its held-out error",
     "climb/step_0/structure.png": "where a force is missing from the structure as given",
@@ -31,14 +31,13 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/missing_force.png": "the force that the final model still lacks",
     "climb/force_error.png": "unexplained force by frequency, final model",
 }
-KEPT = (
+DOCUMENTED_PICTURES = (
     "climb/decay.png",
     "climb/loops.png",
     "climb/step_0/structure.png",
     "climb/response.png",
     "climb/step_0/constancy.png",
 )  # the first of these that there is stands in the documentation
-MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
 Fields = dict[str, Any]
 
 
@@ -318,7 +317,7 @@ def _spoken(name: str) -> str:
 def gallery_page(shown: Sequence[Entry]) -> bytes:
     """Everything on one page, with thumbnails that open."""
     first = PageSection("all", "All of them", document.fragment([climb_overview(shown)]))
-    return document.picture_page(TITLE, [first, *(_section(entry) for entry in shown)])
+    return document.picture_page("Measured records", [first, *(_section(entry) for entry in shown)])
 
 
 def climb_overview(shown: Sequence[Entry]) -> Block:
@@ -360,7 +359,7 @@ def climb_pictures(found: RecordFindings) -> list[Picture]:
 
 def kept(found: RecordFindings) -> list[str]:
     """Names of the pictures that the documentation keeps of a record."""
-    return [name for name in KEPT if (found.folder / name).is_file()][:1]
+    return [name for name in DOCUMENTED_PICTURES if (found.folder / name).is_file()][:1]
 
 
 def picture_name(found: RecordFindings, name: str) -> str:

@@ -15,7 +15,7 @@ from study.diagnose.user_candidates import check_on, own_candidates, unfitted, u
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
-from study.interface.showing import ABOVE, TABLES, Words, drawing_axes, html_table
+from study.interface.showing import LEGEND_ABOVE, TABLES, Words, drawing_axes, html_table
 from study.support.errors import expect
 from study.support.extras import needed
 from study.support.numbers import percent
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from study.interface.planned import PlannedTest
-
-MISSING, NOTHING, UNKNOWN = verdicts.MISSING, verdicts.NOTHING, verdicts.UNKNOWN
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,10 +209,10 @@ class Diagnosis:
         """
         expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
         with drawing_axes(ax) as (axes,):
-            from study.diagnose.diagnosis_pictures import FOLLOWED, followed
+            from study.diagnose.diagnosis_pictures import CANDIDATES_FOLLOWED, followed
 
-            followed(axes, self.result.candidates[:FOLLOWED], along)
-            axes.legend(**ABOVE)
+            followed(axes, self.result.candidates[:CANDIDATES_FOLLOWED], along)
+            axes.legend(**LEGEND_ABOVE)
         return axes
 
     def __repr__(self) -> str:

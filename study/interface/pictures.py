@@ -6,7 +6,7 @@
 from typing import TYPE_CHECKING
 
 from study.equations import dimensions
-from study.interface.showing import ABOVE, drawing_axes
+from study.interface.showing import LEGEND_ABOVE, drawing_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ class FitPictures:
                 axes, prediction.time[part], prediction.measured[part], prediction.predicted[part],
                 self._unit(prediction),
             )  # fmt: skip
-            axes.legend(**ABOVE)
+            axes.legend(**LEGEND_ABOVE)
             axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}", pad=20.0)
         return axes
 
@@ -45,7 +45,7 @@ class FitPictures:
             from study.compare.panels import residual
 
             residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit(prediction))
-            axes.legend(**ABOVE)
+            axes.legend(**LEGEND_ABOVE)
         return axes
 
     def plot_frf(

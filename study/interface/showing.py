@@ -10,9 +10,8 @@ from study.support.extras import DRAWING, needed
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, HEIGHT = 7.0, 2.6  # inches of one panel
 # of a legend: above the panel, where it hides nothing
-ABOVE: dict[str, Any] = {
+LEGEND_ABOVE: dict[str, Any] = {
     "loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "borderaxespad": 0.2
 }  # fmt: skip
 TABLES = ("pandas", "a table in a notebook", "notebook")  # what ``extras.needed`` asks for
@@ -58,7 +57,7 @@ def drawing_axes(ax: "Axes | None", rows: int = 1) -> "Generator[list[Axes]]":
             return
         from matplotlib import pyplot
 
-        size = (WIDTH, HEIGHT * rows + 0.4)
+        size = (7.0, 2.6 * rows + 0.4)  # inches
         figure, grid = pyplot.subplots(rows, 1, figsize=size, squeeze=False, layout="constrained", sharex=rows > 1)  # pyright: ignore[reportUnknownMemberType]
         del figure
         yield list(grid.flat)

@@ -17,11 +17,11 @@ from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.autoregression import burg, continued_by
 from study.support.errors import StudyError
-from study.support.units import ROLES, VOLTAGE, parse_unit, role_unit
+from study.support.units import A_VOLTAGE, ROLES, parse_unit, role_unit
 
 CONTINUED = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
-SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
+UNCERTAIN_PERIODS = 2.0  # of the cut-off frequency, at each end of an integrated channel
 NEAR_END = 8  # samples at each end where a derivative, or a filter, depends on the continuation
 
 
@@ -105,7 +105,7 @@ def _derived(record: Record, coordinate: str, measured: list[str], cutoff: float
 
 def _edge(record: Record, cutoff: float) -> int:
     """Uncertain samples at each end of an integrated channel."""
-    return min(int(np.ceil(SETTLED / (cutoff * record.dt))), len(record) // 4)
+    return min(int(np.ceil(UNCERTAIN_PERIODS / (cutoff * record.dt))), len(record) // 4)
 
 
 def _blended(record: Record, coordinate: str, cutoff: float) -> _Filled:
@@ -211,7 +211,7 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
     turning = record.rotations
     straight = [units[str(s)] for s in sensors if s.coordinate not in turning]
     first = straight[0].text.replace("/", " ").split()[0] if straight else "m"  # ``mm`` in ``mm/s^2``
-    length = first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"
+    length = first if parse_unit(first).powers in (ROLES["displacement"][0], A_VOLTAGE) else "m"
     wanted: dict[str, str] = {}
     for sensor in (Sensor(c, m) for c in record.coordinates for m in MOTIONS):
         own = "rad" if sensor.coordinate in turning else length

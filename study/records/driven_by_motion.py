@@ -21,7 +21,7 @@ from study.support.numbers import LAST_DIGITS
 from study.support.units import parse_unit
 
 BASE = tuple(f"base_{motion}" for motion in MOTIONS)
-SAID = "the base moves: its acceleration, the other way round, is the force"
+BASE_MOVES = "the base moves: its acceleration, the other way round, is the force"
 PER_MASS = "all coefficients are per unit mass (give the inertia in the model for those of the structure)"
 
 
@@ -59,7 +59,7 @@ def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tupl
     acceleration = base[known] if order == 0 else derivative(base[known], record.dt, order)
     base["acceleration"] = acceleration
     driving, channels = FORCE, {FORCE: -(1.0 if mass is None else mass) * acceleration}
-    said = [*notes, SAID if mass is not None else f"{SAID}, and {PER_MASS}"]
+    said = [*notes, BASE_MOVES if mass is not None else f"{BASE_MOVES}, and {PER_MASS}"]
     if absolute:
         for sensor in record.sensors:
             if (motion := sensor.motion) not in base:

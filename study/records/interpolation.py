@@ -13,7 +13,7 @@ from study.records.record import Record, Stretch
 from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
-READINGS = (BAND_LIMITED, "straight", "held")
+BETWEEN_SAMPLES = (BAND_LIMITED, "straight", "held")
 WORDS = {"straight": "goes in straight lines from sample to sample", "held": "is held from each sample to the next"}
 
 
@@ -24,7 +24,7 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
     are continued by point reflection and faded, which confines the error to the first and last few samples. A jump
     from the last sample to the first is recognised by its power up to the Nyquist frequency.
 
-    ``reading`` is one of :data:`READINGS`: a force that a program made may be straight or held between its samples.
+    ``reading`` is one of :data:`BETWEEN_SAMPLES`: a force that a program made may be straight or held there.
     Where a held one jumps, the mean of both values stands: an integrator's steps on both sides then add up to the jump.
     """
     n = len(values)

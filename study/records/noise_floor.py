@@ -15,10 +15,10 @@ from study.support.errors import StudyError
 
 SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
 CLEAR = 3.0  # standard errors by which a line must stand above the noise, to be used
-SMOOTH = 5  # lines that are averaged
+AVERAGED = 5  # lines that are
 BANDS = 20  # bands of the spectrum, or as many as there are lines
-FEWEST = 8  # lines that show a noise floor
-QUIET = 5  # bands, the quietest, that give the floor
+FEWEST_NOISE_LINES = 8  # to show a noise floor
+QUIETEST_BANDS = 5  # that give the floor
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
     frequency, density = autospectrum(residual, dt, segments)
     averages = segments.effective_averages(len(residual))
     kept = density[1:-1][frequency[1:-1] >= low]
-    if len(kept) < FEWEST:
+    if len(kept) < FEWEST_NOISE_LINES:
         raise StudyError(
             f"{len(residual)} samples are judged, of whose spectrum {len(kept)} lines lie above {low:.3g} Hz; "
-            f"{FEWEST} or more show a noise floor: judge a longer part"
+            f"{FEWEST_NOISE_LINES} or more show a noise floor: judge a longer part"
         )
     count = min(BANDS, len(kept))
-    quietest = max(1, count * QUIET // BANDS)
+    quietest = max(1, count * QUIETEST_BANDS // BANDS)
     bands = np.array_split(kept, count)
     means, lines = (np.array([measure(band) for band in bands]) for measure in (np.mean, len))
     spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
@@ -75,8 +75,8 @@ def band_above_noise(values: Floats, dt: float, low: float) -> tuple[Floats, Flo
     cut = Segments(segment_length(len(values), held=8, fewest=32, most=1024))
     frequency, density = autospectrum(values, dt, cut)
     white = found.noise**2 / (0.5 / dt - low)
-    smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")
-    limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
+    smooth = np.convolve(np.pad(density, AVERAGED // 2, mode="edge"), np.ones(AVERAGED) / AVERAGED, "valid")
+    limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * AVERAGED / cut.line_inflation()))
     return frequency, ((smooth > limit) & (frequency >= low)).astype(np.float64)
 
 

@@ -12,8 +12,7 @@ from study.support.errors import StudyError, expect
 from study.support.thresholds import ENOUGH
 
 Span = tuple[int, int]
-FEWEST = 64  # samples in a part
-MOST = 0.5  # of a part: channels that rest for longer do not move in it
+SHORTEST_PART = 64  # samples
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,14 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     sensors = compared_sensors(record, measured)
     given = fit is not None or judge is not None
     half = len(record) // 2
-    usual = ((0, half), (half, len(record))) if given or len(record) < 2 * FEWEST else _halves(record, sensors)
+    usual = ((0, half), (half, len(record))) if given or len(record) < 2 * SHORTEST_PART else _halves(record, sensors)
     fit, judge = fit or usual[0], judge or usual[1]
     motion, force = record.columns(sensors), record.columns(record.forces)
     for name, (first, last) in (("fit", fit), ("judge", judge)):
-        if not 0 <= first < last <= len(record) or last - first < FEWEST:
-            raise StudyError(f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
+        if not 0 <= first < last <= len(record) or last - first < SHORTEST_PART:
+            raise StudyError(
+                f"the part to {name}, {first}:{last}, must hold {SHORTEST_PART} samples or more of {len(record)}"
+            )
         expect(_moves(motion[first:last]), _still(record, sensors, f"the part to {name}, {first}:{last}"))
     if fit[0] < judge[1] and judge[0] < fit[1]:
         raise StudyError(f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap; expected two")
@@ -112,7 +113,7 @@ def _halves(record: Record, sensors: Sequence[Sensor]) -> tuple[Span, Span]:
 def _rests(values: Floats) -> bool:
     """Whether channels stay at one value for most of a part, from its beginning or to its end."""
     first, last = moving(values)
-    return last - first < (1.0 - MOST) * len(values)
+    return last - first < 0.5 * len(values)
 
 
 def driven_apart(record: Record, one: Span, other: Span) -> bool:

@@ -8,11 +8,11 @@ import numpy as np
 
 from study.records.completion import complete
 from study.records.outputs import Outputs
-from study.records.plan import FEWEST, Plan, compared_sensors, make_plan
+from study.records.plan import SHORTEST_PART, Plan, compared_sensors, make_plan
 from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Bools, Floats
 
-QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
+PICTURED = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ class Prepared:
             return self
         if self.record.joints:  # of a stretch that would be cut to a rest of few samples, none
             end = self.record.stretch_of(last - samples)[1]
-            return self.with_fit(end if end - (last - samples) < FEWEST and end < last else last - samples, last)
+            return self.with_fit(end if end - (last - samples) < SHORTEST_PART and end < last else last - samples, last)
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
 
 
@@ -134,7 +134,7 @@ def limited(prepared: Prepared, samples: int) -> Prepared:
     if last - first <= samples:
         return shorter
     meeting = replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
-    if shorter is prepared or _shown(meeting, prepared) > QUIET:
+    if shorter is prepared or _shown(meeting, prepared) > PICTURED:
         return meeting
     begin, length = prepared.plan.fit[0], min(prepared.plan.fit[1] - prepared.plan.fit[0], last - first)
     moved = [

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from study.records import MOTIONS
 from study.records.number_table import number_table
 from study.support.arrays import Floats
 from study.support.csv_text import csv_bytes
 from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
-MOTIONS = ("displacement", "velocity", "acceleration")
 OF_THE_GROUND = "base_acceleration"  # stands for a force where the base of a structure moves
 FORCE = "force"  # on a single mass; what is predicted where the motion is prescribed
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
@@ -67,7 +67,7 @@ class Record:
     period: int | None = None  # samples in one period, where the excitation is periodic
     stretches: tuple[Stretch, ...] = ()  # what it is strung together of; empty for a record of its own
     changed: frozenset[str] = frozenset()  # channels that are no longer those of its stretches
-    between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.READINGS``
+    between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.BETWEEN_SAMPLES``
     coordinates: tuple[str, ...] = (ALONE,)  # whose motions its channels may be
     forces: tuple[str, ...] = ("force",)  # which channels are forces
     remarks: tuple[str, ...] = ()  # what its reader noticed, a sentence each: units that nobody gave, rest, junk

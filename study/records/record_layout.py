@@ -13,7 +13,16 @@ import numpy as np
 
 from study.records.completion import CompletedRecord, complete
 from study.records.driven_by_motion import with_prescribed_motion
-from study.records.plan import FEWEST, Plan, Span, compared_sensors, driven_apart, falls_silent, make_plan, shared
+from study.records.plan import (
+    SHORTEST_PART,
+    Plan,
+    Span,
+    compared_sensors,
+    driven_apart,
+    falls_silent,
+    make_plan,
+    shared,
+)
 from study.records.prepared import FORCE, Prepared, prepare_record
 from study.records.record import MOTIONS, Record, Sensor, Stretch
 from study.records.sampling_rate import completed_without_spare
@@ -22,8 +31,8 @@ from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
-PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly that of its neighbours (docs/tool.md)
-BLOCKS = 24  # of a stretch, at most
+BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours (docs/tool.md)
+BLOCKS_OF_STRETCH = 24  # at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
 STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
@@ -210,9 +219,9 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
     edge = completed.edge
     low, high = max(first, edge), min(last, len(completed.record) - edge)
     expect(
-        high - low >= FEWEST,
+        high - low >= SHORTEST_PART,
         f"{completed.record.name}: samples {first} to {last} leave {max(high - low, 0)} that are sure; expected "
-        f"{FEWEST} or more",
+        f"{SHORTEST_PART} or more",
     )
     return Stretch(completed.record, low, high)
 
@@ -220,10 +229,10 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
 def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
     """A stretch up to where the motion has died away to practically nothing: rest tells nothing of a structure."""
     values = stretch.source.columns(sensors, (stretch.first, stretch.last))
-    away = np.abs(values - np.mean(values[-FEWEST // 2 :], axis=0))
+    away = np.abs(values - np.mean(values[-SHORTEST_PART // 2 :], axis=0))
     loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
     last = int(loud[-1]) + 1 if len(loud) else 0
-    return replace(stretch, last=stretch.first + min(max(last, 2 * FEWEST), len(stretch)))
+    return replace(stretch, last=stretch.first + min(max(last, 2 * SHORTEST_PART), len(stretch)))
 
 
 def _unbroken(stretch: Stretch, sensors: Sequence[Sensor]) -> tuple[Stretch, str]:
@@ -261,8 +270,8 @@ def alternating(
     """
     fit, judge = list[Stretch](), list[Stretch]()
     for number, stretch in enumerate(stretches):
-        most = int(len(stretch) / max((anew or PERIODS) * period_of(stretch, sensors), FEWEST))
-        for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS)))):
+        most = int(len(stretch) / max((anew or BLOCK_PERIODS) * period_of(stretch, sensors), SHORTEST_PART))
+        for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS_OF_STRETCH)))):
             block = replace(block, continues=place > 1 and not anew)  # the motion runs on through the blocks between
             (fit if (number + place) % 2 == 0 else judge).append(block)
     return fit, judge
@@ -301,7 +310,7 @@ def within_the_horizon(
             wanted = max(len(stretch) / (HORIZON * period_of(stretch, sensors)), -(-PIECES // len(stretches)))
         else:
             wanted = len(stretch) * stretch.source.dt / seconds
-        count = min(max(round(wanted), 1), max(len(stretch) // FEWEST, 1))
+        count = min(max(round(wanted), 1), max(len(stretch) // SHORTEST_PART, 1))
         pieces += cut(stretch, count)
     return pieces, float(np.mean([len(p) for p in pieces])) * stretches[0].source.dt
 
@@ -334,7 +343,10 @@ def strung_together(
     channels = {c: np.concatenate([s.source[c][s.first : s.last] for s in stretches]) for c in common}
     split, total = sum(map(len, fit)), sum(map(len, stretches))
     for part, samples in (("fit", split), ("judge", total - split)):
-        expect(samples >= FEWEST, f"{first.name}: {samples} samples are left to {part}; expected {FEWEST} or more")
+        expect(
+            samples >= SHORTEST_PART,
+            f"{first.name}: {samples} samples are left to {part}; expected {SHORTEST_PART} or more",
+        )
     record = Record(
         first.dt, channels, first.units, first.name, first.start, stretches=stretches, coordinates=first.coordinates,
         forces=first.forces, computed=first.computed.union(*(c.record.computed for c in completed)),
@@ -399,8 +411,8 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
     whole = _begun_anew(prepared, stretches)
     yield whole
     joined = Stretch(prepared.record, 0, len(prepared.record))
-    samples = PERIODS * period_of(joined, prepared.sensors)
-    pieces = [p for s in stretches for p in cut(s, max(round(len(s) / max(samples, FEWEST)), 1))]
+    samples = BLOCK_PERIODS * period_of(joined, prepared.sensors)
+    pieces = [p for s in stretches for p in cut(s, max(round(len(s) / max(samples, SHORTEST_PART)), 1))]
     if len(pieces) > len(stretches):
         yield replace(_begun_anew(prepared, pieces), running_on=whole)
 

@@ -29,7 +29,7 @@ from study.support.thresholds import ALPHA
 ORDER = 3  # products of the motion up to this order do not fold into its band: those of most library terms' forces
 BIAS = 0.1  # standard errors by which what is left out may shift a coefficient
 JUMP = 2.0  # power of the frequency with which the density of an acceleration that jumps falls
-LEAST = 512  # samples in either part: what a segment of the spectra takes
+LEAST_SAMPLES = 512  # in either part: what a segment of the spectra takes
 TOO_COARSE = 2.0 / 3.0  # of the power above half the Nyquist frequency: of white noise half of it is there
 PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: where the filter falls
 
@@ -90,7 +90,7 @@ def spare_factor(records: Sequence[Record], shortest: int) -> int:
     shortest : int
         Samples in the shorter of both parts.
     """
-    most = shortest // LEAST
+    most = shortest // LEAST_SAMPLES
     if most < 2:
         return 1
     needed = max(content(record[s], record.dt).enough for record in records for s in record.sensors)

@@ -37,9 +37,9 @@ from study.support.errors import StudyError, at, expect
 
 IDENTIFIED = ("linear", "nonlinear", "coherence", "histogram")  # drawn of every case
 PRELIMINARY = ("pattern", "autospectrum", "force_history", "force_histogram")  # of Section 3: drawn where numbered
-NAME = "up to 64 of a to z, 0 to 9 and _, a letter first, and a dot between two digits alone"
+NAME_OR_DECIMAL = "up to 64 of a to z, 0 to 9 and _, a letter first, and a dot between two digits alone"
 Name = Annotated[  # a dot elsewhere is that of a file or of a rule
-    str, Field(pattern=r"^[a-z]([a-z0-9_]|(?<=[0-9])[.](?=[0-9]))*\Z", max_length=64, description=NAME)
+    str, Field(pattern=r"^[a-z]([a-z0-9_]|(?<=[0-9])[.](?=[0-9]))*\Z", max_length=64, description=NAME_OR_DECIMAL)
 ]
 Number = Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(lambda cell: cell or None)]
 Words = Annotated[tuple[str, ...], BeforeValidator(lambda cell: cell.split() if isinstance(cell, str) else cell)]
@@ -48,7 +48,7 @@ JUDGED, KIND = "report", "gaussian_lowpass"  # the force that the claims judge, 
 CURVES = ("siso", "miso", "local_polynomial", "instrumental", "output_error")  # have some of every case to be drawn
 LOOKED_AT = (2.0, 4.0)  # hertz: where the claims read single lines, the Dead-Band's and the Mathieu's
 LONGER, INPUTS = 4, 2  # the claims cut segments this many times as long too, and tell so many inputs apart in them
-LINES = 4  # of a segment, that the fit band spans at least
+FEWEST_BAND_LINES = 4  # of a segment, that the fit band spans
 CLAIMED = ("changed", "by_chance", "error")  # limits of what is claimed of a structure
 
 
@@ -163,8 +163,8 @@ def load_structures(folder: Path, taken: Iterable[str] = ()) -> Cases[CaseSettin
     source = folder / "structures.yaml"
     settings = read_yaml(source, CaseSettings[CaseTolerances])
     with at(source):
-        unknown = [name for name in settings.estimators if name not in reverse_system.ESTIMATORS]
-        known = ", ".join(reverse_system.ESTIMATORS)
+        unknown = [name for name in settings.estimators if name not in reverse_system.STRUCTURE_ESTIMATORS]
+        known = ", ".join(reverse_system.STRUCTURE_ESTIMATORS)
         expect(not unknown, f"there is no estimator {unknown[:1]} of structures; known are {known}")
         expect("miso" in settings.estimators, "estimators lacks 'miso', whose coherences are drawn of every case")
         low, high = settings.fit_band
@@ -213,7 +213,9 @@ def _check_settings(settings: StudySettings) -> None:
     (low, high), line = settings.fit_band, settings.resolution
     band, width = list(settings.fit_band), 2 * settings.local_polynomial.half_width + 1
     expect(low < high <= 0.5 / dt, f"fit_band is {band}; it must rise and end below {0.5 / dt:g} Hz")
-    expect(high - low >= LINES * line, f"fit_band is {band}; it must span four lines of {line:g} Hz or more")
+    expect(
+        high - low >= FEWEST_BAND_LINES * line, f"fit_band is {band}; it must span four lines of {line:g} Hz or more"
+    )
     expect(
         (high - low) * samples * dt >= width,
         f"local_polynomial.half_width makes bands of {width} lines; fit_band {band} of {samples} samples holds fewer",
@@ -249,7 +251,7 @@ def _check_reached(excitation: ExcitationSettings, settings: StudySettings) -> N
     begun = f"fit_band of config.yaml is {list(settings.fit_band)}; the excitation"
     expect(high <= force.highest, f"{begun} has nothing above {force.highest:g} Hz, where the band must end or before")
     expect(
-        high - force.lowest >= LINES * line,
+        high - force.lowest >= FEWEST_BAND_LINES * line,
         f"{begun} begins at {force.lowest:g} Hz, and four lines of {line:g} Hz or more must lie above",
     )
 

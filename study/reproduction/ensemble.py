@@ -32,9 +32,9 @@ ERROR_COLUMNS = [
     "case", "estimator", "parameter", "true", "kind", "median_error", "standard_error", "gain",
     "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error",
 ]  # fmt: skip
-FIRST = 2  # seeds whose median has a column of its own: by it a later run shows that it gives the same errors
+FIRST_SEEDS = 2  # whose median has a column of its own: by it a later run shows that it gives the same errors
 Estimates = Mapping[str, float]
-FINE = IntegratorSettings(method="rk4", steps_per_sample=16)
+FINELY = IntegratorSettings(method="rk4", steps_per_sample=16)
 STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "rk4") for s in (1, 2, 4, 8)]
 NOTHING_FOUND = {"parameter": "", "true": math.nan, "fine": math.nan, "mean_error": math.nan,
                  "standard_error": math.nan, "relative_error": math.nan}  # fmt: skip
@@ -115,12 +115,12 @@ def estimator_errors(found: pd.DataFrame) -> pd.DataFrame:
     error of MI/SO over this one, nan where MI/SO gives nothing to compare with. ``bias`` and ``scatter`` are mean and
     standard deviation of the signed error.
     ``found`` of ``seeds`` give an estimate, ``noted`` of them with a note, such as that the search did not converge.
-    ``first_error`` is the median over the first ``FIRST`` seeds alone.
+    ``first_error`` is the median over the ``FIRST_SEEDS`` alone.
     """
     seeds = {str(case): sorted(group["seed"].unique()) for case, group in found.groupby("case")}
     rows: list[dict[str, Any]] = []
     for (case, estimator, parameter), group in found.groupby(["case", "estimator", "parameter"], sort=False):
-        first, count, true = seeds[str(case)][:FIRST], len(seeds[str(case)]), float(group["true"].iloc[0])
+        first, count, true = seeds[str(case)][:FIRST_SEEDS], len(seeds[str(case)]), float(group["true"].iloc[0])
         signed = (group["estimate"].to_numpy(dtype=np.float64) - true) / (abs(true) or 1.0)
         median, error = middle(np.abs(signed), count)
         scatter = float(np.std(signed, ddof=1)) if len(signed) > 1 else math.nan
@@ -196,7 +196,7 @@ def integrator_study(
         for reading in readings:
             excitation = record.excitation.model_copy(update={"reading": reading})
             base = record.model_copy(update={"excitation": excitation})
-            fine, _ = _estimates(model, base, FINE, estimation, seeds)
+            fine, _ = _estimates(model, base, FINELY, estimation, seeds)
             for integrator in STUDIED if reading == readings[0] else STUDIED[:1]:
                 found, lost = _estimates(model, base, integrator, estimation, seeds)
                 about = {"system": name, "reading": reading, **integrator.plain()}

@@ -25,7 +25,7 @@ from study.reproduction.preliminary import Histogram, Pattern
 from study.support.arrays import Floats
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
-BESIDE = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO
+DRAWN_OVER = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO
 DASHED = (0, (5.0, 2.0))
 
 
@@ -100,7 +100,7 @@ def cumulative_coherence(case: CaseFiles) -> Figure:
     table = pd.read_csv(case.coherences)
     shares = curves.coherences(table, HIGHEST)
     known = set(table["estimator"])
-    others = [e for e in BESIDE if e in known and (case.drawn is None or e in case.drawn)]
+    others = [e for e in DRAWN_OVER if e in known and (case.drawn is None or e in case.drawn)]
     figure, axes = page.empty_page(
         case.heading, "Cumulative coherence", panel=2.7, legend_rows=len(shares) * (1 + len(others)), headed=False
     )  # fmt: skip
@@ -253,11 +253,11 @@ PANELS = {  # by their headings, the parameters in them
     r"damping ratio $\zeta$": ("zeta",), "cubic stiffness $k_3$": ("k3",), "nonlinear damping $c_3$": ("c3",),
     "$k_m$, dead-band $k$": ("k_m", "k_dead_band"),
 }  # fmt: skip
-COLUMNS = 4
+PANELS_A_ROW = 4
 MARKERS = {"siso": ("x", False), "miso": ("s", True), "local_polynomial": ("^", True), "instrumental": ("D", False),
            "output_error": ("o", False)}  # fmt: skip
 LOWEST_ERROR, HIGHEST_ERROR = 1e-7, 1e3  # percent: what lies outside stands at the edge
-LEFT, TOP, ROW = 1.5, 1.15, 0.19  # inches
+INSET, TOP, ROW = 1.5, 1.15, 0.19  # inches
 
 
 def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
@@ -266,23 +266,23 @@ def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
     Parameters that are zero have no relative error and are not drawn. ``cases`` are the rows, from above.
     """
     drawn = table[table["kind"] == "relative"]
-    rows = -(-len(PANELS) // COLUMNS)
+    rows = -(-len(PANELS) // PANELS_A_ROW)
     width, height = 10.2, TOP + rows * (ROW * len(cases) + 0.35) + 0.5
     figure = Figure(figsize=(width, height))
-    figure.subplots_adjust(left=LEFT / width, right=0.985, top=1.0 - TOP / height, bottom=0.5 / height, wspace=0.08,
+    figure.subplots_adjust(left=INSET / width, right=0.985, top=1.0 - TOP / height, bottom=0.5 / height, wspace=0.08,
                            hspace=0.35 / (ROW * len(cases)))  # fmt: skip
-    axes = list(figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).flat)
+    axes = list(figure.subplots(rows, PANELS_A_ROW, sharex=True, sharey=True, squeeze=False).flat)
     for panel, (title, parameters) in zip(axes, PANELS.items(), strict=True):
         _error_panel(panel, drawn[drawn["parameter"].isin(parameters)], cases)
         panel.set_title(title)
-    for panel in axes[-COLUMNS:]:
+    for panel in axes[-PANELS_A_ROW:]:
         panel.set_xlabel("error (%)")
     seeds = int(table["seeds"].max())
     subtitle = f"median over {seeds} seeds of the relative error, with the median's standard error; less is to the left"
-    page.head(figure, "Errors of the estimators on the same records", subtitle, LEFT, 0.1)
+    page.head(figure, "Errors of the estimators on the same records", subtitle, INSET, 0.1)
     entries = page.legend_entries(axes)
     figure.legend(list(entries.values()), list(entries), loc="upper left", ncols=len(entries), borderaxespad=0.0,
-                  bbox_to_anchor=(LEFT / width, 1.0 - 0.58 / height), borderpad=0.0, handlelength=1.2)  # fmt: skip
+                  bbox_to_anchor=(INSET / width, 1.0 - 0.58 / height), borderpad=0.0, handlelength=1.2)  # fmt: skip
     return figure
 
 

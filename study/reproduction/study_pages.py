@@ -17,7 +17,7 @@ from study.support.numbers import percent
 Row = Mapping[str, Any]
 TITLE = "The report, run again"
 TABLE_WIDTH = 110  # characters of a measured number in a table
-WANTED = 0.99  # of the seeds, for each noise-free parameter
+WANTED_SHARE = 0.99  # of the seeds, for each noise-free parameter
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
     "reverse the two, and every term of the equation of motion is a linear path of its own (reverse dynamic MI/SO). "
@@ -316,18 +316,18 @@ def tolerance_blocks(results: Results) -> list[Block]:
     quiet = results["monte_carlo"]
     quiet = quiet[quiet["case"].map(results.noise) == 0.0]
     own = quiet[quiet["estimator"] == "miso"]
-    low = own[own["within_tolerance"] < WANTED].sort_values("within_tolerance")
+    low = own[own["within_tolerance"] < WANTED_SHARE].sort_values("within_tolerance")
     lines = [
         f"{row['case']}: {row['parameter']} in {100.0 * row['within_tolerance']:.1f} ± "
         f"{100.0 * row['rate_error']:.1f} %"
         for row in each_row(low)
     ]
     for name, group in quiet[quiet["estimator"] != "miso"].groupby("estimator", sort=False):
-        met = int((group["within_tolerance"] >= WANTED).sum())
+        met = int((group["within_tolerance"] >= WANTED_SHARE).sum())
         lines.append(f"beside it, {str(name).replace('_', ' ')}: {met} of {len(group)} do")
     said = (
         f"{len(own) - len(low)} of {len(own)} MI/SO estimates of noise-free cases meet their tolerance in at least "
-        f"{100.0 * WANTED:g} % of {int(results['monte_carlo']['seeds'].max())} seeds."
+        f"{100.0 * WANTED_SHARE:g} % of {int(results['monte_carlo']['seeds'].max())} seeds."
     )
     return [Text(said), Bullets(tuple(lines))]
 
@@ -384,7 +384,7 @@ def integrator_blocks(results: Results) -> list[Block]:
 
     said = (
         "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({ensemble.FINE.method}, {ensemble.FINE.steps_per_sample} steps a sample), with its standard error; "
+        f"({ensemble.FINELY.method}, {ensemble.FINELY.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
         "The report's own setting is abm4 with one step a sample (Section 2.2)."
     )

@@ -10,7 +10,7 @@ from study.support.errors import StudyError, expect
 from study.support.files import read_text
 from study.support.yaml_text import as_mapping, read_plain, shown
 
-EXPECTED = {  # by the first part of pydantic's name of a fault, with its numbers
+EXPECTED_VALUES = {  # by the first part of pydantic's name of a fault, with its numbers
     "greater_than_equal": "{ge:.12g} or more",
     "greater_than": "a number above {gt:.12g}",
     "less_than_equal": "{le:.12g} or less",
@@ -114,7 +114,7 @@ def _sentence(fault: Mapping[str, Any], kind: type[Section]) -> str:
         return f"{above + ': ' if above else ''}{words}; expected {known}"
     if code == "value_error":
         return f"{place} {numbers['error']}".strip()
-    near = [words for begin, words in EXPECTED.items() if code.startswith(begin)]
+    near = [words for begin, words in EXPECTED_VALUES.items() if code.startswith(begin)]
     expected = near[0].format(**numbers) if near else str(fault["msg"])
     if code in ("string_pattern_mismatch", "string_too_long"):  # a pattern tells nobody what was expected
         expected = _at(kind, path[:-1]).model_fields[path[-1]].description or expected

@@ -21,7 +21,7 @@ from typing import Any, cast
 
 from study.support.errors import StudyError, expect
 
-BESIDE = ".study-"  # begins the name of a file that is still being written
+UNFINISHED = ".study-"  # begins the name of a file that is still being written
 TEXT_BYTES = 1_000_000  # the longest sensible text file of a user has a few kilobytes
 FREE_SPACE = "expected a writable folder with free space"
 
@@ -54,7 +54,7 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     kept; a symbolic link stays one.
     """
     target = Path(os.path.realpath(path))
-    beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
+    beside = target.with_name(f"{UNFINISHED}{secrets.token_hex(8)}{target.suffix}")
     try:
         os.stat(f"{target.parent}/.")  # noqa: PTH116  (the dot asks whether it is a folder)
         if target.is_dir():

@@ -10,6 +10,7 @@ import numpy as np
 
 from study.support.arrays import Complexes, Floats
 
+DISTINCT = 1e-9  # share of the largest singular value below which equations do not tell of a direction
 INDISTINCT = 1e-12  # share of the largest singular value, eigenvalue or variance below which there is rounding alone
 _lstsq, _pinv = cast(Any, np.linalg.lstsq), cast(Any, np.linalg.pinv)  # their annotations leave the element type open
 

@@ -20,7 +20,7 @@ from scipy.linalg import solveh_banded
 from study.support.arrays import Floats, Ints
 from study.support.least_squares import INDISTINCT
 
-OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
+RELATIVE_OFFSET = 1e-4  # of the next step, in standard errors: a search has converged then (Bates and Watts, 1981)
 ROUNDING = 1e-11  # share of the response that a step changes at which a search has converged too
 PATIENCE = 8  # trials that may pass without lowering the error by what matters
 MATTERS = 1e-3  # fall of the error that matters, as a share of what a step of one standard error brings
@@ -242,7 +242,11 @@ class End:
 
 
 def minimise(
-    linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int, offset: float = OFFSET
+    linearise: Callable[[Floats], Point | None],
+    point: Point,
+    size: float,
+    max_iterations: int,
+    offset: float = RELATIVE_OFFSET,
 ) -> End:
     """Search from a point with Nielsen's damping.
 

@@ -28,34 +28,36 @@ class Powers(NamedTuple):
         return self.voltage == 1 or self.current == 1
 
 
-FORCE, LENGTH, TIME, VOLTAGE = Powers(force=1), Powers(length=1), Powers(time=1), Powers(voltage=1)
+A_FORCE, A_LENGTH, A_TIME, A_VOLTAGE = Powers(force=1), Powers(length=1), Powers(time=1), Powers(voltage=1)
 VELOCITY, ACCELERATION = Powers(length=1, time=-1), Powers(length=1, time=-2)
 STANDARD_GRAVITY = 9.80665  # m/s^2, exact by definition (3rd CGPM, 1901)
 POUND_FORCE = 0.45359237 * STANDARD_GRAVITY  # N, exact by definition
 
 BASES: dict[str, tuple[float, Powers]] = {
-    "N": (1.0, FORCE), "lbf": (POUND_FORCE, FORCE), "lb": (POUND_FORCE, FORCE), "kip": (1000.0 * POUND_FORCE, FORCE),
-    "kgf": (STANDARD_GRAVITY, FORCE), "dyn": (1e-5, FORCE), "kg": (1.0, Powers(1, -1, 2)),
-    "m": (1.0, LENGTH), "in": (0.0254, LENGTH), "inch": (0.0254, LENGTH), "mil": (0.0254e-3, LENGTH),
-    "ft": (0.3048, LENGTH), "s": (1.0, TIME), "sec": (1.0, TIME), "min": (60.0, TIME), "h": (3600.0, TIME),
-    "V": (1.0, VOLTAGE), "A": (1.0, Powers(current=1)), "Gal": (0.01, ACCELERATION),
+    "N": (1.0, A_FORCE), "lbf": (POUND_FORCE, A_FORCE), "lb": (POUND_FORCE, A_FORCE),
+    "kip": (1000.0 * POUND_FORCE, A_FORCE),
+    "kgf": (STANDARD_GRAVITY, A_FORCE), "dyn": (1e-5, A_FORCE), "kg": (1.0, Powers(1, -1, 2)),
+    "m": (1.0, A_LENGTH), "in": (0.0254, A_LENGTH), "inch": (0.0254, A_LENGTH), "mil": (0.0254e-3, A_LENGTH),
+    "ft": (0.3048, A_LENGTH), "s": (1.0, A_TIME), "sec": (1.0, A_TIME), "min": (60.0, A_TIME), "h": (3600.0, A_TIME),
+    "V": (1.0, A_VOLTAGE), "A": (1.0, Powers(current=1)), "Gal": (0.01, ACCELERATION),
     # Angles and strains take the place of a displacement, as moments take that of a force: a record holds no other.
-    "rad": (1.0, LENGTH), "deg": (math.pi / 180.0, LENGTH), "strain": (1.0, LENGTH), "microstrain": (1e-6, LENGTH),
+    "rad": (1.0, A_LENGTH), "deg": (math.pi / 180.0, A_LENGTH), "strain": (1.0, A_LENGTH),
+    "microstrain": (1e-6, A_LENGTH),
     **dict.fromkeys(("g", "gn", "g_n"), (STANDARD_GRAVITY, ACCELERATION)),
 }  # fmt: skip
 PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 PREFIXED = ("N", "m", "s", "V", "A", "g", "gn", "rad")
-PLAIN = str.maketrans({
+PLAIN_CHARACTERS = str.maketrans({
     "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
     "°": "deg",
 })  # fmt: skip
 FACTOR = re.compile(r"([A-Za-z_]+)(?:\^?(-?[0-9]))?")
 ROLES: dict[str, tuple[Powers, str]] = {
-    "force": (FORCE, "N, kN, lbf, kgf, V or A"),
-    "displacement": (LENGTH, "m, mm, cm, um, in, ft, rad, deg or V"),
+    "force": (A_FORCE, "N, kN, lbf, kgf, V or A"),
+    "displacement": (A_LENGTH, "m, mm, cm, um, in, ft, rad, deg or V"),
     "velocity": (VELOCITY, "m/s, mm/s, in/s or V"),
     "acceleration": (ACCELERATION, "m/s^2, mm/s^2, g or V"),
-    "time": (TIME, "s, ms or us"),
+    "time": (A_TIME, "s, ms or us"),
 }
 
 
@@ -70,7 +72,7 @@ class Unit:
 
 def parse_unit(text: str) -> Unit:
     """Understand a unit; of what is none, a ``StudyError`` names some that are."""
-    plain = text.strip().replace("**", "^").translate(PLAIN).replace("^-^", "^-")
+    plain = text.strip().replace("**", "^").translate(PLAIN_CHARACTERS).replace("^-^", "^-")
     plain = re.sub(r"\s*([/^])\s*", r"\1", " ".join(plain.replace("(", " ").replace(")", " ").split()))
     factor, powers = 1.0, Powers()
     for position, group in enumerate(plain.split("/")):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from study.support.errors import StudyError
-from study.support.files import BESIDE
+from study.support.files import UNFINISHED
 from study.support.terminal import harmless
 
 BRANCHES = ("body", "orelse", "finalbody", "handlers", "cases")  # of a statement: no expression holds an import
@@ -42,7 +42,7 @@ def only_run(path: Path) -> TextIO:
 def remove_half_written(*folders: Path) -> None:
     """Remove what killed runs left half written. Only who runs alone may do this."""
     for folder in folders:
-        for path in folder.rglob(f"{BESIDE}*"):
+        for path in folder.rglob(f"{UNFINISHED}*"):
             path.unlink(missing_ok=True)
 
 

@@ -17,8 +17,8 @@ from study.support.errors import StudyError, expect
 from study.support.numbers import LARGEST, SMALLEST
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
-DEEPEST = 8
-EXPECTED = "expected a mapping such as 'name: rig'"
+DEEPEST_YAML = 8
+EXPECTED_MAPPING = "expected a mapping such as 'name: rig'"
 
 
 def _yaml() -> Any:
@@ -37,12 +37,12 @@ def read_plain(text: str) -> object:
         told: Any = error
         line = f" in line {told.problem_mark.line + 1}" if told.problem_mark else ""
         problem = excerpt(str(told.problem or told.context).splitlines()[0])
-        raise StudyError(f"is not YAML ({problem}{line}); {EXPECTED}") from None
+        raise StudyError(f"is not YAML ({problem}{line}); {EXPECTED_MAPPING}") from None
     except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
         problem = (str(error) or type(error).__name__).splitlines()[0]
         if problem.startswith("Exceeds the limit"):  # Python reads no number of thousands of digits
             problem = "a number of too many digits"
-        raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED}") from None
+        raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED_MAPPING}") from None
 
 
 def _screen(text: str) -> None:
@@ -52,7 +52,7 @@ def _screen(text: str) -> None:
         kind, line = type(event).__name__, event.start_mark.line + 1
         depth += kind in ("SequenceStartEvent", "MappingStartEvent")
         depth -= kind in ("SequenceEndEvent", "MappingEndEvent")
-        small = depth <= DEEPEST and count <= MOST_EVENTS
+        small = depth <= DEEPEST_YAML and count <= MOST_EVENTS
         expect(small, f"is too large or too deeply nested (line {line}); expected a short list")
         if getattr(event, "anchor", None) is not None:  # an alias has one too: the name it repeats
             raise StudyError(f"uses the YAML anchor or alias {event.anchor!r} in line {line}; write the value itself")

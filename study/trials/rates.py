@@ -21,7 +21,8 @@ from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, CHANGES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
-from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
+from study.trials.runs import COMPLETED, PAIR, REMOVED, SINGLE, WITH, WITHOUT
+from study.trials.varying import NO_EFFECT
 
 _, FAINT_NOISE, MODEST_NOISE, _ = NOISES  # up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
@@ -157,7 +158,7 @@ def as_good_as_truth(row: Row) -> float:
 
 
 def _hidden(test: Member = lambda _: True) -> Member:
-    return lambda row: row["hidden"] != NONE and test(row)
+    return lambda row: row["hidden"] != NO_EFFECT and test(row)
 
 
 def _kinds(*kinds: str) -> Member:
@@ -170,7 +171,7 @@ def _single(test: Member = lambda _: True, above: float = -1.0, up_to: float = m
 
 
 def _nothing_hidden(row: Row) -> bool:
-    return row["hidden"] == NONE
+    return row["hidden"] == NO_EFFECT
 
 
 def _faulty(row: Row) -> bool:
@@ -205,7 +206,7 @@ def _number(column: str) -> Score:
 
 def _effects(*counts: int) -> Member:
     """Of trials like real rigs that could be made: so many effects hidden."""
-    return lambda row: row["hidden"] != "" and (row["hidden"] != NONE) * (row["hidden"].count("+") + 1) in counts
+    return lambda row: row["hidden"] != "" and (row["hidden"] != NO_EFFECT) * (row["hidden"].count("+") + 1) in counts
 
 
 def _of_kinds(*tests: str) -> Member:
@@ -234,9 +235,9 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             # A constant force behind a high-pass leaves nothing to be seen.
             Reach("... where the true model leaves less than that without the effect",
                   _single(lambda r: not r["error_true"] >= r["error_before"]), tied_score),
-            Reach("nothing missing where nothing is, and of completed models", _kinds(NONE, COMPLETED), nothing_score,
-                  "nothing"),
-            Reach("... where nothing is", _kinds(NONE), nothing_score),
+            Reach("nothing missing where nothing is, and of completed models", _kinds(NO_EFFECT, COMPLETED),
+                  nothing_score, "nothing"),
+            Reach("... where nothing is", _kinds(NO_EFFECT), nothing_score),
             Reach("... of completed models", _kinds(COMPLETED), nothing_score),
             Reach("both of two, by diagnose and add", _kinds(PAIR), pair_score, "both"),
             Reach("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
@@ -380,8 +381,8 @@ def _wanted(wanted: Wanted, key: str, place: int) -> float:
 
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Numbers of trials by what was hidden (rows: each effect alone, none) and what was said (columns)."""
-    rows = [row for row in rows_of(table) if row.get("kind", SINGLE) in (SINGLE, NONE)]
-    return _counted([(row["hidden"] or NONE, _said(row)) for row in rows])
+    rows = [row for row in rows_of(table) if row.get("kind", SINGLE) in (SINGLE, NO_EFFECT)]
+    return _counted([(row["hidden"] or NO_EFFECT, _said(row)) for row in rows])
 
 
 def confusion_of_places(table: pd.DataFrame) -> pd.DataFrame:
@@ -391,7 +392,9 @@ def confusion_of_places(table: pd.DataFrame) -> pd.DataFrame:
         said, true = _path(row["first_place"]), _path(row["place"])
         kind = "to the ground, or a force on it" if "ground" in true else "between two"
         where = SAME_PLACE if said == true else END_IN_COMMON if (said & true) - {"ground"} else ANOTHER_PLACE
-        pairs.append((f"{kind}, {row['coordinates']} coordinates" if true else NONE, where if said else _said(row)))
+        pairs.append(
+            (f"{kind}, {row['coordinates']} coordinates" if true else NO_EFFECT, where if said else _said(row))
+        )
     return _counted(pairs)
 
 
@@ -407,7 +410,7 @@ def _path(label: str) -> set[str]:
 
 def _counted(pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
     """Effects and places in the order of the library, then those of nobody's, then what is neither."""
-    order = (*LIBRARY, SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE, "", NONE, NOTHING, UNKNOWN, NOT_DIAGNOSED)
+    order = (*LIBRARY, SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE, "", NO_EFFECT, NOTHING, UNKNOWN, NOT_DIAGNOSED)
 
     def ordered(names: Iterable[str]) -> list[str]:
         return sorted(set(names), key=lambda name: (order.index(name if name in order else ""), name))
@@ -447,7 +450,7 @@ def against_alpha(table: pd.DataFrame) -> pd.DataFrame:
     rows = [row for row in rows_of(table) if not row["trouble"]]
     lines: list[dict[str, float]] = []
     for alpha in ALPHAS:
-        alarms = proportion([float(r["smallest_p"] < alpha) for r in rows if r["kind"] in (NONE, COMPLETED)])
+        alarms = proportion([float(r["smallest_p"] < alpha) for r in rows if r["kind"] in (NO_EFFECT, COMPLETED)])
         asked = [r for r in rows if r["kind"] == SINGLE and not math.isnan(r["true_p"])]
         missed = proportion([float(r["true_p"] >= alpha) for r in asked])
         lines.append(

@@ -31,9 +31,9 @@ from study.trials.kept import BY_TEST, CHANGES, KEPT_TABLES, LIKE_RIGS, NEXT_TES
 from study.trials.kinds import TESTS
 from study.trials.next_tests import judged_next_test
 from study.trials.rigs import RIG_KINDS
-from study.trials.varying import KINDS_OF_CHANGES, judged_varying, make_varying_trial
+from study.trials.varying import KINDS_OF_CHANGES, NO_EFFECT, judged_varying, make_varying_trial
 
-SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
+SINGLE, PAIR, REMOVED, COMPLETED = "single", "pair", "removed", "completed"
 PLANNED = "planned"  # of a test after a tie
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
 
@@ -89,7 +89,7 @@ def _wanted(
     drawn = [couples[int(i)] for i in rng.permutation(len(couples))[: settings.pairs]]
     kinds = {
         SINGLE: [(name,) for _ in range(settings.rounds * len(settings.noises)) for name in HIDDEN],
-        NONE: [()] * (settings.none * len(settings.noises)),
+        NO_EFFECT: [()] * (settings.none * len(settings.noises)),
         COMPLETED: [(name,) for _ in range(settings.completed) for name in HIDDEN],
         PAIR: drawn,
         REMOVED: [(name,) for _ in range(settings.removed) for name in HIDDEN if faults == WITHOUT],
@@ -116,7 +116,7 @@ def structure_orders(count: int = 120, first: int = 20_000) -> list[Order]:
         none = i % 6 == 5
         hidden = () if none else (effects[(i - i // 6) % len(effects)],)
         noise, motion = noises[i % len(noises)], motions[(i // len(noises)) % len(motions)]
-        kind, size = NONE if none else SINGLE, 2 + (i // 2) % 4
+        kind, size = NO_EFFECT if none else SINGLE, 2 + (i // 2) % 4
         every.append(Order(kind, first + i, hidden, noise, motion, test=STRUCTURE, coordinates=size))
     return every
 
@@ -153,7 +153,7 @@ def change_orders(first: int = 660_001, each: int = 20) -> list[Order]:
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
     judged = _judged_planned if order.kind == PLANNED else JUDGES.get(order.test, _judged_test)
-    nothing = "" if order.test == DRIVEN_MASS else NONE
+    nothing = "" if order.test == DRIVEN_MASS else NO_EFFECT
     row: Row = {
         "kind": order.kind, "seed": order.seed, "test": order.test, "faults": order.faults, "noise": order.noise,
         "response": order.response, "coordinates": order.coordinates,

@@ -26,7 +26,7 @@ from study.way_in.compare_records import compare_records
 
 KINDS_OF_CHANGES = ("drift", "step", "schedule", "schedule_and_nonlinearity", "nonlinear", "nothing")
 NONLINEAR = ("cubic_stiffness", "quadratic_damping", "coulomb_friction", "quadratic_stiffness")
-NONE = "none"  # hidden
+NO_EFFECT = "none"
 ACTS_ON = {"linear_stiffness": "u", "linear_damping": "v"}
 
 
@@ -119,7 +119,7 @@ def judged_varying(trial: Trial) -> Row:
     answer, before = found.answer, found.comparison.prediction
     named = set[str]() if answer is None else set(answer.names)
     row: Row = {
-        "hidden": "+".join(trial.hidden) or NONE, "noise": trial.noise, "verdict": found.verdict,
+        "hidden": "+".join(trial.hidden) or NO_EFFECT, "noise": trial.noise, "verdict": found.verdict,
         "named": "+".join(sorted(named)), "right": int(named == set(trial.hidden)),
         "alike": int(_plain(named) == _plain(trial.hidden)), "changes": int(found.changes), "held": 0, "asked": 0,
         "error_before": before.error, "error_after": "" if answer is None else answer.response_error,

@@ -174,12 +174,12 @@ def compare_records(
     return found
 
 
-LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
+LOST_ITS_WAY = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
 
 
 def has_lost_its_way(prediction: Prediction) -> bool:
     """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
-    return prediction.error > LOST and is_smooth(prediction.residual, len(prediction.views))
+    return prediction.error > LOST_ITS_WAY and is_smooth(prediction.residual, len(prediction.views))
 
 
 def running_on(comparison: Comparison) -> Comparison:

@@ -8,7 +8,7 @@ from study.compare import history
 from study.diagnose import confirmed_faults, verdict
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY
-from study.explore.saved import PAGE
+from study.explore import PAGE
 from study.records.record import write_csv
 
 # A climb diagnoses at each step; the few that could take part in what is tested are enough to choose from.

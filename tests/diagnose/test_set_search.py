@@ -180,7 +180,7 @@ def test_exchanges_go_on_until_none_gains(monkeypatch: pytest.MonkeyPatch):
 def test_no_set_is_larger_than_four(monkeypatch: pytest.MonkeyPatch):
     bench = Bench(monkeypatch, hidden("abcde"))
     bench.search()
-    assert max(bench.sizes()) == set_search.MOST == 4
+    assert max(bench.sizes()) == set_search.MOST_EFFECTS == 4
 
 
 def test_an_effect_of_the_smaller_set_changes_places_with_another(monkeypatch: pytest.MonkeyPatch):
@@ -232,7 +232,7 @@ def test_simple_sets_grow_by_what_they_gain_themselves_though_a_flexible_effect_
     def leaves(found: frozenset[str]) -> dict[str, float]:
         return {"c": 0.3} if "f" in found else dict.fromkeys({"a", "b", "c"} - found, 1.0)
 
-    search = Bench(monkeypatch, leaves).search(fewer_than=set_search.MOST + 1)
+    search = Bench(monkeypatch, leaves).search(fewer_than=set_search.MOST_EFFECTS + 1)
     assert best(search, 1) == "f"
     assert search.sets(2, simple=True)[0].power > search.sets(1)[0].power > search.sets(3)[0].power
     assert best(search, 3) == "abc"

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from study.equations.dimensions import VARIABLES, compose, dimensions, pretty
+from study.equations.dimensions import VARIABLE_DIMENSIONS, compose, dimensions, pretty
 
 L, T = Fraction(1), Fraction(1)
 
@@ -31,7 +31,7 @@ def test_parts_that_do_not_share_a_dimension_have_none(text: str) -> None:
 
 
 def test_known_names_extend_the_variables() -> None:
-    assert dimensions("z*gap", {"z": VARIABLES["u"], "gap": VARIABLES["u"]}) == (2, 0)
+    assert dimensions("z*gap", {"z": VARIABLE_DIMENSIONS["u"], "gap": VARIABLE_DIMENSIONS["u"]}) == (2, 0)
 
 
 @pytest.mark.parametrize(

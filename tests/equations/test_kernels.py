@@ -55,7 +55,7 @@ def test_arrays_that_do_not_fit_are_refused(systems: dict[str, Model]) -> None:
 
 
 def test_a_library_that_was_not_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
+    monkeypatch.setattr(kernels, "COMPILED", tmp_path / kernels.COMPILED.name)
     monkeypatch.setattr(kernels, "PROJECT", "a project that is not installed")
     kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
     with pytest.raises(StudyError, match=r"_kernels.* is not there.*pip install"):
@@ -68,15 +68,15 @@ def test_sources_without_a_library_take_that_of_the_installed_package(
     """As a job of a cluster does, whose sources are those that Git knows."""
     installed = tmp_path / "study" / "equations"
     installed.mkdir(parents=True)
-    shutil.copy(kernels.LIBRARY, installed)
+    shutil.copy(kernels.COMPILED, installed)
     (tmp_path / "reverse_miso_study-0.1.0.dist-info").mkdir()
     (tmp_path / "reverse_miso_study-0.1.0.dist-info" / "METADATA").write_text("Name: reverse-miso-study\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
+    monkeypatch.setattr(kernels, "COMPILED", tmp_path / kernels.COMPILED.name)
     kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
     assert kernels.evaluate(product(), {"a": np.array([2.0]), "b": np.array([3.0])}, 1)[0, 0] == 6.0
 
 
 def test_the_library_is_of_these_sources() -> None:
     newest = max(path.stat().st_mtime for path in SOURCES.iterdir())
-    assert kernels.LIBRARY.stat().st_mtime >= newest, "run `make` or `pip install -e .`: a source has changed"
+    assert kernels.COMPILED.stat().st_mtime >= newest, "run `make` or `pip install -e .`: a source has changed"

@@ -18,11 +18,11 @@ from study.diagnose.confirmed_faults import Diagnosed
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import decimate, page_units, words
+from study.explore import PAGE, decimate, page_units, words
 from study.explore import session as sessions
 from study.explore.axis_scales import log_ticks
 from study.explore.desk import Desk
-from study.explore.saved import PAGE, files, of_stage, saved
+from study.explore.saved import files, of_stage, saved
 from study.explore.view import View, history_columns
 from study.records.prepared import prepare_record
 from study.support.errors import StudyError

@@ -11,7 +11,7 @@ from playwright.sync_api import Page
 
 from study import trials
 from study.compare.decay import decays_of
-from study.compare.force_map import CELLS, FEWEST, cells_of, surface
+from study.compare.force_map import CELLS, FEWEST_VISITS, cells_of, surface
 from study.compare.residual_checks import residual_checks
 from study.compare.response_functions import response_functions
 from study.equations.model import Model, free
@@ -176,7 +176,7 @@ def test_a_map_that_stays_empty_says_why() -> None:
     focus = Focus(comparison, 0, comparison.place)
     assert place_words.one_place(focus, seen=True, tied=False)["plane-hint"] == place_words.READ
     lacking = comparison.missing_force
-    few = slice(lacking.inner.start, lacking.inner.start + 3 * FEWEST)
+    few = slice(lacking.inner.start, lacking.inner.start + 3 * FEWEST_VISITS)
     motion = {name: getattr(lacking, name)[few] for name in ("displacement", "velocity", "force")}
     short = replace(comparison, missing_force=replace(lacking, edge=0, **motion))
     hint = place_words.one_place(Focus(short, 0, short.place), seen=True, tied=False)["plane-hint"]

@@ -12,10 +12,11 @@ from bokeh.document import Document
 from study.compare import history
 from study.compare.comparison import compare
 from study.equations import model_file
+from study.explore import PAGE
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.live import Watcher
-from study.explore.saved import PAGE, files, saved
+from study.explore.saved import files, saved
 from study.explore.view import View
 from study.faults.accounting import Accounted
 from study.faults.fault import NOTHING_ASKED, FaultSettings

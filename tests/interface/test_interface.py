@@ -63,7 +63,7 @@ def test_the_stub_names_what_the_package_offers():
 def test_a_package_is_a_package_and_a_function_whatever_was_loaded_first():
     for first in ("st.compare", "importlib.import_module('study.compare.comparison')"):
         code = f"import study as st, importlib; {first}"
-        code += "; import study.compare.panels as panels; panels.COLUMNS\ntry:\n    st.compare([])\n"
+        code += "; import study.compare.panels as panels; panels.DRAWN_COLUMNS\ntry:\n    st.compare([])\n"
         code += "except st.StudyError as error:\n    print(error)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.strip() == "no fit is given; expected one or more"
@@ -341,7 +341,7 @@ def test_the_measured_response_function_is_that_of_the_linear_system_within_its_
 def test_the_users_own_candidate_is_shown_whatever_its_rank(found, monkeypatch):
     from study.diagnose import diagnosis_report
 
-    monkeypatch.setattr(diagnosis_report, "SHOWN", 1)
+    monkeypatch.setattr(diagnosis_report, "ON_SCREEN", 1)
     rank = 1 + [c.name for c in found.candidates].index("bushing")
     assert rank > 1
     lines = found.table().splitlines()

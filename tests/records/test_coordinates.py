@@ -9,7 +9,7 @@ import pytest
 
 from study.records.completion import complete, consistent
 from study.records.readers import ReadOptions, Roles, read_record
-from study.records.readers.options import KEYS
+from study.records.readers.options import OPTION_KEYS
 from study.records.record import MOTIONS, Record, Sensor, write_csv
 from study.support.errors import StudyError
 
@@ -107,7 +107,7 @@ def test_what_stands_beside_the_file_counts_for_structures(tmp_path: Path) -> No
 
 def test_no_option_is_forgotten_here() -> None:
     """Faults and thinning, which are said beside a file too, are no matter of reading it."""
-    assert set(KEYS) - {"measurement", "as_sampled"} == {
+    assert set(OPTION_KEYS) - {"measurement", "as_sampled"} == {
         "columns", "units", "dt", "fs", "group", "samples", "period", "accept_saturated", "accept_swapped",
         "free", "scale",
     }  # fmt: skip

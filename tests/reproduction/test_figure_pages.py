@@ -96,7 +96,7 @@ def test_nothing_overlaps_on_any_page(products, system, kind, monkeypatch, tmp_p
 def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
-    names = (*styles.ESTIMATORS, "another_one")
+    names = (*styles.ESTIMATOR_LOOKS, "another_one")
     case = products("duffing_van_der_pol", "Noise", spread=0.5, estimators=names)
     draw_case(case, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, SHEET)
     for figure in seen:

@@ -119,7 +119,7 @@ def test_scaled_units():
 
 
 def test_no_two_estimators_look_alike_in_grey():
-    looks = [*styles.ESTIMATORS.values(), styles.look("something_new")]
+    looks = [*styles.ESTIMATOR_LOOKS.values(), styles.look("something_new")]
     assert len({str(look.dash) for look in looks}) == len(looks)
     assert styles.look("something_new").label == "something new"
     assert styles.legend_place("miso") < styles.legend_place("siso") < styles.legend_place("something_new")

@@ -16,10 +16,10 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.reverse_system import ReverseSystem
 from study.support.arrays import Floats
 from study.support.errors import StudyError
+from study.support.least_squares import DISTINCT
 from study.support.levenberg_marquardt import Point, minimise, point_at
 
-TRIALS = 60  # of the search
-DISTINCT = 1e-9  # singular values below this share of the largest: the equations do not tell
+MOST_TRIALS = 60  # of the search
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def joint_estimate(system: ReverseSystem, held: Mapping[str, float] | None = Non
     if first is None:
         raise StudyError("the equations of motion have no finite coefficients; expected a motion at every coordinate")
     full = start.copy()
-    full[free] = minimise(point, first, float(np.linalg.norm(rows.left @ rows.value)), TRIALS).point.x
+    full[free] = minimise(point, first, float(np.linalg.norm(rows.left @ rows.value)), MOST_TRIALS).point.x
     residual, jacobian = _distance(rows, full)
     inverse = _inverse(rows.left @ jacobian[:, free]) @ rows.left
     freedom = min(_estimate(r.found).freedom for r in system.results)

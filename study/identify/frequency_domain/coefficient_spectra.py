@@ -17,6 +17,7 @@ from study.equations.place import HERE, Place
 from study.identify.frequency_domain import instruments
 from study.identify.frequency_domain.coefficients import Responses
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
+from study.identify.frequency_domain.linear_start import FAINT
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of
 from study.records import spectra
@@ -24,8 +25,6 @@ from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, segment_length
 from study.support.arrays import Bools, Complexes, Floats
-
-FAINT = 1e-3  # of the strongest line's force
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
 INERTIA = 2  # order of its time derivative
-LARGEST = 1e150  # of an input: the square of one beyond may be no number
+LARGEST_INPUT = 1e150  # the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
-MOST_STEPS = 64  # ... and at most
+MOST_STATE_STEPS = 64  # ... and at most
 AGREED = 0.01  # of a state's rms: what other steps may change
 
 
@@ -190,7 +190,7 @@ def _settled(integrated: Callable[[int], Floats]) -> Floats:
     short memory make a state that grows without end, and may yet be finite.
     """
     states, steps = integrated(STATE_STEPS), STATE_STEPS
-    while steps < MOST_STEPS:
+    while steps < MOST_STATE_STEPS:
         steps *= 4
         coarse, states = states, integrated(steps)
         with np.errstate(all="ignore"):
@@ -206,7 +206,7 @@ def _alone(part: Record) -> Record:
 
 def _finite(values: Floats, item: Input, record: Record) -> Floats:
     with np.errstate(invalid="ignore"):
-        bad = np.flatnonzero(~(np.abs(values) < LARGEST))
+        bad = np.flatnonzero(~(np.abs(values) < LARGEST_INPUT))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
         raise StudyError(

@@ -27,7 +27,7 @@ from study.support.least_squares import INDISTINCT, floored, normal_inverse
 NODES = 15  # nodes of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
 NOISY = {"u": "displacement", "v": "velocity"}  # channels with noise, by their names in a formula
 TINY = float(np.finfo(np.float64).tiny)
-STRETCHES, FEWEST = 16, 8  # parts of the record, at most and at least, whose scatter gives the errors of coefficients
+MOST_STRETCHES, FEWEST_STRETCHES = 16, 8  # parts of the record whose scatter gives the errors of coefficients
 RUN_ERROR = 1e-8  # of a channel's mean square: noise below is the error of the free run
 
 
@@ -42,8 +42,8 @@ def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Flo
 
 def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[SpectralMatrix]:
     """Spectral matrices of stretches of the record that do not overlap; none if it is too short for them."""
-    count = min(STRETCHES, len(values[0]) // segments.length)
-    if count < FEWEST:
+    count = min(MOST_STRETCHES, len(values[0]) // segments.length)
+    if count < FEWEST_STRETCHES:
         return []
     length = len(values[0]) // count
     return [spectra.cross_spectra([v[i * length :][:length] for v in values], dt, segments) for i in range(count)]

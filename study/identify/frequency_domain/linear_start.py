@@ -22,12 +22,13 @@ from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import End, Point, minimise, point_at
 
-FAINT, CHANCE = 1e-3, 0.01  # as for a single coordinate: share of the strongest line's force, coherence of noise alone
-LINES = 300  # at most
-CLEAN = 1e-4  # share of a response that counts as its error at least, where there is no noise
-POOR = 0.01  # share of the responses' power: a search that leaves more has ended at a local minimum
-ROUNDS, TRIALS = 6, 40  # weighted solutions; runs of a search
-DRAWN, STARTS, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
+FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
+CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
+MOST_LINES = 300
+LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
+LOCAL_MINIMUM = 0.01  # share of the responses' power: a search that leaves more has ended at one
+WEIGHTED_SOLUTIONS, SEARCH_RUNS = 6, 40
+DRAWN, STARTED, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +80,9 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
         said = f"forces and motions of {prepared.record.name!r} have nothing in common at any frequency"
         floats = f"nothing ties {model.name!r} down and what is measured drifts; expected accelerations, which do not"
         raise StudyError(f"{said}: {floats}" if loose_motions(model) else said)
-    noise = own * np.maximum(1.0 - coherence, CLEAN) / max(matrix.averages - n, 1.0)
+    noise = own * np.maximum(1.0 - coherence, LEAST_ERROR) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
-    thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]
+    thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // MOST_LINES)]
     return SensorResponses(omega[thin], response[thin], error[thin])
 
 
@@ -147,7 +148,7 @@ class _Linear:
         )
         left: Complexes = np.broadcast_to(np.eye(n), self.held.shape) / size[:, None, None]
         found: list[Floats] = []
-        for k in range(ROUNDS):
+        for k in range(WEIGHTED_SOLUTIONS):
             w = weight if k else np.ones_like(weight)
             design = _real(np.einsum("fij,kfjm->kfim", left, columns) * w).reshape(len(columns), -1).T
             x = least_squares(design, _real((left @ target) * w).ravel())
@@ -200,7 +201,7 @@ def lumped_start(model: Model, prepared: Prepared, held: Mapping[str, float]) ->
     if not any(_follows(problem, end) for end in ends):
         drawn = [point for x in _drawn(model, problem, free, held) if (point := problem.point(x)) is not None]
         drawn.sort(key=lambda point: point.cost)
-        for first in range(0, STARTS, BATCH):
+        for first in range(0, STARTED, BATCH):
             ends += [end for point in drawn[first : first + BATCH] for end in _searched(problem, point.x)]
             if any(_follows(problem, end) for end in ends):
                 break
@@ -221,13 +222,13 @@ def _comes_to_rest(model: Model, values: Mapping[str, float]) -> bool:
 
 def _follows(problem: _Linear, end: End) -> bool:
     """Whether a structure responds by and large as measured, as a nonlinear one too does like some linear one."""
-    return end.point.cost < POOR * float(np.linalg.norm(problem.measured / problem.error)) ** 2
+    return end.point.cost < LOCAL_MINIMUM * float(np.linalg.norm(problem.measured / problem.error)) ** 2
 
 
 def _searched(problem: _Linear, x: Floats) -> list[End]:
     point = problem.point(x)
     size = float(np.linalg.norm(problem.measured / problem.error))
-    return [] if point is None else [minimise(problem.point, point, size, TRIALS, 1e-2)]
+    return [] if point is None else [minimise(problem.point, point, size, SEARCH_RUNS, 1e-2)]
 
 
 def _drawn(model: Model, problem: _Linear, free: list[str], held: Mapping[str, float]) -> list[Floats]:

@@ -25,8 +25,8 @@ from study.support.errors import StudyError
 from study.support.least_squares import INDISTINCT, floored, influence
 
 AT_A_TIME = 256  # bands solved together: memory does not grow with bands times inputs
-SPARE = 8  # lines in a band beyond the unknowns, to estimate the noise from
-STRETCHES = 32  # parts of the record whose scatter gives the errors of coefficients
+SPARE_LINES = 8  # in a band beyond the unknowns, to estimate the noise from
+PARTS = 32  # of the record, whose scatter gives the errors of coefficients
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ class LocalPolynomial:
     def check(self, inputs: int) -> None:
         """Refuse bands with too few lines for so many inputs, naming the half width that would do."""
         unknowns = (inputs + 1) * (self.degree + 1)
-        if self.width < unknowns + SPARE:
+        if self.width < unknowns + SPARE_LINES:
             raise StudyError(
                 f"local_polynomial.half_width is {self.half_width}; {inputs} inputs of degree {self.degree} have "
-                f"{unknowns} unknowns in a band, which needs {(unknowns + SPARE) // 2} or more"
+                f"{unknowns} unknowns in a band, which needs {(unknowns + SPARE_LINES) // 2} or more"
             )
 
 
@@ -164,7 +164,7 @@ def fit_local_polynomial(
     Returns
     -------
     estimate : Estimate
-    shifts : array, shape (STRETCHES, coefficients)
+    shifts : array, shape (PARTS, coefficients)
         How far the coefficients move when one stretch of time after the other is left out: those of two equations of
         one record give the covariance between them.
     """
@@ -196,18 +196,18 @@ def fit_local_polynomial(
     residual = (target - design @ values) / each
     shifts = _shifts(moves.conj() * each, design.T / each, residual, index.ravel(), lines.samples) / size
     symbols = tuple(s for s, known in zip(symbols_of(inputs), driven, strict=True) if known)
-    return Estimate(symbols, values / size, covariance_between(shifts, shifts), STRETCHES - 1.0), shifts
+    return Estimate(symbols, values / size, covariance_between(shifts, shifts), PARTS - 1.0), shifts
 
 
 def covariance_between(first: Floats, second: Floats) -> Floats:
     """Covariance of two sets of coefficients from how far both move without each stretch of time (jackknife)."""
-    return first.T @ second * ((STRETCHES - 1.0) / STRETCHES)
+    return first.T @ second * ((PARTS - 1.0) / PARTS)
 
 
 def _shifts(
     moves: Complexes, design: Complexes, residual: Complexes, index: Ints, samples: int
 ) -> Floats:  # fmt: skip
-    """Shifts of ``Re(conj(moves) . noise)`` on leaving out one stretch of time after the other, (STRETCHES, p).
+    """Shifts of ``Re(conj(moves) . noise)`` on leaving out one stretch of time after the other, (PARTS, p).
 
     Over a stretch, influence times residual sums to s and influence times design to H; all H sum to the
     identity. Without the stretch the coefficients would shift by ``(1 - H)^-1 s``: H is the share of the stretch's own
@@ -217,8 +217,8 @@ def _shifts(
     spectra = np.zeros((2 * count + 1, samples // 2 + 1), dtype=np.complex128)
     spectra[:, index + 1] = np.concatenate([moves, design, residual[None]])
     histories = np.asarray(irfft(spectra, samples, axis=1), dtype=np.float64)
-    long = samples // STRETCHES
-    cut = histories[:, : STRETCHES * long].reshape(-1, STRETCHES, long).transpose(1, 0, 2) * np.sqrt(0.5 * samples)
+    long = samples // PARTS
+    cut = histories[:, : PARTS * long].reshape(-1, PARTS, long).transpose(1, 0, 2) * np.sqrt(0.5 * samples)
     sums = cut[:, :count] @ cut[:, count:].transpose(0, 2, 1)
     remaining = np.eye(count) - sums[:, :, :count]
     return np.asarray(np.linalg.solve(remaining, sums[:, :, count:]), dtype=np.float64)[:, :, 0]

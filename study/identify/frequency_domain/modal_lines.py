@@ -14,6 +14,7 @@ from scipy.fft import rfft
 from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
+from study.identify.frequency_domain.linear_start import FAINT
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Complexes, Floats, Ints
@@ -78,11 +79,10 @@ def _stack(values: Complexes, turn: Complexes, blocks: int) -> Complexes:
     return np.concatenate([(values * power[:, None]).T for power in powers])
 
 
-BLOCKS, MOST = 24, 8  # block rows of the subspace; modes at most
-SPARE = 4  # poles that may be real beside those of the modes: of the record's ends, and of what no mode is
-LINES = 1200  # at most
-FAINT = 1e-3  # of the strongest line's force: what is below drives nothing
-TRIALS = 60
+BLOCK_ROWS, MOST_MODES = 24, 8  # of the subspace
+REAL_POLES = 4  # beside those of the modes, at most: of the record's ends, and of what no mode is
+MOST_DRIVEN_LINES = 1200
+MODAL_TRIALS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +139,8 @@ def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
     strongest = max(float(np.max(power)) for power in smooth)
     driven = [np.flatnonzero(power > FAINT * strongest) for power in smooth]
     count = sum(map(len, driven))
-    expect(count > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {count} lines; expected more")
-    kept = [lines[:: max(1, count // LINES)] for lines in driven]
+    expect(count > 4 * BLOCK_ROWS, f"the forces of {prepared.record.name!r} drive {count} lines; expected more")
+    kept = [lines[:: max(1, count // MOST_DRIVEN_LINES)] for lines in driven]
     found = np.concatenate([lines[keep] for lines, keep in zip(spectra, kept, strict=True)])
     s = 2j * np.pi * np.concatenate([f[keep] for f, keep in zip(frequency, kept, strict=True)])
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
@@ -248,7 +248,7 @@ class LineFit:
     criterion: float  # of Bayes, for white noise in proportion to each sensor (Schwarz, 1978)
 
 
-def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[LineFit]:
+def line_fits(model: Model, prepared: Prepared, most: int = MOST_MODES) -> Iterator[LineFit]:
     """For one mode, two and so on up to ``most``, modes and coefficients with the smallest error of the lines.
 
     Raises
@@ -267,12 +267,14 @@ def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[Li
     drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
     inputs = np.concatenate([lines.forces, lines.unit], axis=1)
     shown = lines.outputs / lines.order * np.abs(lines.order)
-    space = observability(lines.s.imag, inputs, shown, BLOCKS, lines.stretch)
+    space = observability(lines.s.imag, inputs, shown, BLOCK_ROWS, lines.stretch)
     power = float(np.sum(np.abs(lines.outputs) ** 2))
     for modes in range(1, most + 1):
         modal = ModalPart(points).of(modes)
         problem = _Modal(lines, modal, at, drives, ways, np.pi / prepared.dt)
-        starts = (_searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + SPARE + 1))
+        starts = (
+            _searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + REAL_POLES + 1)
+        )
         found = next((point for point in starts if point is not None), None)
         if found is not None:
             left = float(found.residual @ found.residual) / power
@@ -287,7 +289,7 @@ def left_of_lines(model: Model, prepared: Prepared) -> float:
     With as many of them as the Bayesian criterion asks for. A fit takes hundredths of a second, and no free run.
     """
     try:
-        fits = list(line_fits(model, prepared, model.modal.count if model.modal else MOST))
+        fits = list(line_fits(model, prepared, model.modal.count if model.modal else MOST_MODES))
     except StudyError:
         return np.inf
     return min(fits, key=lambda f: f.criterion).left if fits else np.inf
@@ -304,7 +306,7 @@ def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:
     if point is None:
         return None
     size = float(np.linalg.norm(problem.lines.outputs))
-    return minimise(problem.point, point, size, TRIALS, 1e-2).point
+    return minimise(problem.point, point, size, MODAL_TRIALS, 1e-2).point
 
 
 def _named(model: Model, modal: ModalPart, parts: tuple[Floats, Floats, Floats, Floats]) -> Model:

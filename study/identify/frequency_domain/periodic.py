@@ -31,7 +31,7 @@ from study.support.errors import StudyError
 from study.support.least_squares import floored, normal_inverse
 
 Chosen = tuple[int, ...]
-MOST = 12  # periods that are treated one by one; of more, neighbours are averaged first
+MOST_PERIODS = 12  # that are treated one by one; of more, neighbours are averaged first
 NEIGHBOURS = 10  # lines on either side that a variance is averaged over: its own line would correlate with the weight
 PASSES = 4  # weights from the coefficients before
 
@@ -147,7 +147,7 @@ def _grouped(record: Record) -> dict[str, Floats]:
     """Channels by period, (periods, samples); of many periods, averages of neighbours."""
     assert record.period is not None, "checked by steady()"
     periods = len(record) // record.period
-    each = -(-periods // MOST)
+    each = -(-periods // MOST_PERIODS)
     count = periods // each
     return {
         name: values[len(values) - count * each * record.period :].reshape(count, each, record.period).mean(axis=1)

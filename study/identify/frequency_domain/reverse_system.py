@@ -194,14 +194,14 @@ def _result(equation: Equation, found: Identified) -> EquationResult:
     return EquationResult(equation.coordinate, equation.mass, found)
 
 
-ESTIMATORS = {"siso": linear_alone, "miso": by_conditioned_spectra, "local_polynomial": by_local_polynomials}
+STRUCTURE_ESTIMATORS = {"siso": linear_alone, "miso": by_conditioned_spectra, "local_polynomial": by_local_polynomials}
 
 
 def reverse_system(name: str, equations: Sequence[Equation], dt: float, settings: Settings) -> ReverseSystem:
     """All equations by the estimator of this name."""
-    if name not in ESTIMATORS:
-        raise StudyError(f"there is no estimator {name!r} of structures; known are {', '.join(ESTIMATORS)}")
-    return ESTIMATORS[name](equations, dt, settings)
+    if name not in STRUCTURE_ESTIMATORS:
+        raise StudyError(f"there is no estimator {name!r} of structures; known are {', '.join(STRUCTURE_ESTIMATORS)}")
+    return STRUCTURE_ESTIMATORS[name](equations, dt, settings)
 
 
 def exact_responses(result: EquationResult, values: Mapping[str, float]) -> list[Complexes]:

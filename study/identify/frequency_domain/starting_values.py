@@ -17,7 +17,7 @@ from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
-from study.identify.frequency_domain.linear_start import lumped_start
+from study.identify.frequency_domain.linear_start import CHANCE, FAINT, lumped_start
 from study.identify.time_domain.free_decay import free_decay_start
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.records.prepared import FORCE, Prepared
@@ -28,10 +28,8 @@ from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares, normal_inverse
 
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
-FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
 FEWEST_LINES = 4  # two more than mass, damping and stiffness need
-SHORT = 512  # samples below which coherence may be missing because the record is short
-CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
+LONG_ENOUGH = 512  # samples: below, coherence may be missing because the record is short
 PADDED = 4  # times as many lines as samples show, for the peak of a short decay
 FEWEST_WINDOWS = 3  # of a period each, from which a decay is read
 
@@ -73,15 +71,15 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
         return found
     if len(found.omega) >= FEWEST_LINES:
         return found
-    while len(part) >= SHORT and length < len(part) // 2:
+    while len(part) >= LONG_ENOUGH and length < len(part) // 2:
         length = min(2 * length, len(part) // 2)
         found, chance = _lines(part, response, length)
         if len(found.omega) > max(1.0, chance):  # two lines are four equations
             return found
-    if len(part) < SHORT:
+    if len(part) < LONG_ENOUGH:
         raise StudyError(
             f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
-            f"have in common; fit a longer part, {SHORT} samples or more"
+            f"have in common; fit a longer part, {LONG_ENOUGH} samples or more"
         )
     raise StudyError(
         f"force and {response} of {record.name!r} have nothing in common at any frequency; expected a response to this "

@@ -11,17 +11,17 @@ from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.shooting import ShootingSegments
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError
-from study.support.levenberg_marquardt import OFFSET
+from study.support.levenberg_marquardt import RELATIVE_OFFSET
 
-TRIALS = 6  # free runs for each set of segments
-NEAR = 0.01  # standard errors: how near a minimum an intermediate fit has to come
-RARE = 1e-3  # probability that two segments of one motion are kept apart
+SET_RUNS = 6  # free runs for each set of segments
+NEAR = 0.01  # standard errors: how near a minimum an intermediate fit, or that of a search, has to come
+FALSELY_APART = 1e-3  # probability that two segments of one motion are kept apart
 NEGLIGIBLE = 1e-3  # of the response's standard deviation: a residual that the integrator may have made
 
 
 def fit_segments(
     model: Model, segments: ShootingSegments, states: Floats, held: Collection[str], max_iterations: int,
-    continuity: float = 0.0, offset: float = OFFSET,
+    continuity: float = 0.0, offset: float = RELATIVE_OFFSET,
 ) -> FreeRunFit:  # fmt: skip
     """:func:`free_run_fit.fit_free_run` from these initial states of the segments."""
     return fit_free_run(
@@ -54,16 +54,16 @@ def _merged(fit: FreeRunFit, segments: ShootingSegments, held: Collection[str]) 
     """Every second segment merged with the one before, except where the misfit rises by more than chance explains."""
     states, begins = np.atleast_2d(fit.initial), np.array([segments.span[0], *fit.restarts])
     pair = np.arange(len(begins)) // 2
-    wide = fit_segments(fit.model, _restarted(segments, begins[::2]), states[::2], held, TRIALS, offset=NEAR)
+    wide = fit_segments(fit.model, _restarted(segments, begins[::2]), states[::2], held, SET_RUNS, offset=NEAR)
     firsts = len(segments.outputs) * (begins[::2] - begins[0])
     rise = np.add.reduceat(wide.residual**2 - fit.residual**2, firsts)
-    split = rise > _quantile(states.shape[1], RARE) * _variance(fit, segments)
+    split = rise > _quantile(states.shape[1], FALSELY_APART) * _variance(fit, segments)
     if not split.any():
         return wide
     apart = split[pair]
     stays = apart | (np.arange(len(begins)) % 2 == 0)
     initial = np.where(apart[:, None], states, np.atleast_2d(wide.initial)[pair])
-    return fit_segments(wide.model, _restarted(segments, begins[stays]), initial[stays], held, TRIALS, offset=NEAR)
+    return fit_segments(wide.model, _restarted(segments, begins[stays]), initial[stays], held, SET_RUNS, offset=NEAR)
 
 
 def _restarted(segments: ShootingSegments, begins: Ints) -> ShootingSegments:

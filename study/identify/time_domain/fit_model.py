@@ -20,6 +20,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.start_of_changes import start_of_changes
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
+from study.identify.time_domain.continuation import NEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
@@ -50,10 +51,10 @@ from study.support.errors import DivergenceError, StudyError, expect
 
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
-BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
-SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
-BESIDE = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
-NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
+# Of a motion at one frequency: resonances to begin at, over that frequency.
+DRIVEN_BELOW, DRIVEN_ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)
+SAME_MINIMUM = 1e-6  # of a mass: two searches for it end as near without noise
+NEARBY_FACTORS = (0.9, 0.95, 1.05, 1.1)  # times a shape parameter, where fits begin beside what a search found
 
 
 def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> FreeRunFit:
@@ -142,7 +143,7 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
     place = fit.keys.index("m")
     own, other = (f.model.numbers()["m"] for f in (fit, again))
     known = np.sqrt([covariance_of(f, linearise(f, prepared))[place, place] for f in (fit, again)])
-    return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME * own
+    return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME_MINIMUM * own
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
@@ -170,7 +171,7 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     omega = driven_at(model, prepared)
     if omega:  # only the transient tells the mass, and a fit begun at another resonance loses step with it
         steady = linear["k"] - linear["m"] * omega**2
-        ratios = BELOW if steady > 0.0 else ABOVE
+        ratios = DRIVEN_BELOW if steady > 0.0 else DRIVEN_ABOVE
         masses = [steady / ((ratio * omega) ** 2 - omega**2) for ratio in ratios]
         starts += [linear | {"m": m, "k": steady + m * omega**2} for m in masses]
     return [{key: value for key, value in start.items() if key not in model.held_keys} for start in starts]
@@ -230,7 +231,7 @@ def _beside_modes(base: Baseline, entry: ModelTerm, points: Sequence[Start]) -> 
     if not found:
         raise StudyError(f"no modes let {entry.name} follow {base.prepared.record.name}; expected an effect that does")
     best = found[0].parameters
-    near = [best] if points or not best else [tuple(factor * x for x in best) for factor in (1.0, *BESIDE)]
+    near = [best] if points or not best else [tuple(factor * x for x in best) for factor in (1.0, *NEARBY_FACTORS)]
     given = {key: value for key, value in entry.values.items() if value is not None}
     shapes = [[x if own is None else own for x, own in zip(p, entry.parameters, strict=True)] for p in near]
     return with_modal_term(base.fit, entry, shapes, base.prepared, tuple(given))

@@ -12,7 +12,7 @@ import numpy as np
 from study.equations.linear_part import linear_keys, patterns
 from study.equations.model import Model
 from study.records.noise_floor import band_above_noise, in_band
-from study.records.plan import FEWEST
+from study.records.plan import SHORTEST_PART
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect
@@ -69,4 +69,4 @@ def _fitted_samples(prepared: Prepared, whole: int, edge: int) -> Ints:
     last = whole - edge
     fitted = samples[slice(*prepared.plan.fit)]
     kept = fitted[(fitted >= edge) & (fitted < last)]
-    return kept if len(kept) > FEWEST else fitted
+    return kept if len(kept) > SHORTEST_PART else fitted

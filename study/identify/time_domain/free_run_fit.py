@@ -21,9 +21,9 @@ from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Bools, Floats
 from study.support.errors import DivergenceError, StudyError
-from study.support.levenberg_marquardt import OFFSET, ContinuityGaps, End, Point, minimise, point_at
+from study.support.levenberg_marquardt import RELATIVE_OFFSET, ContinuityGaps, End, Point, minimise, point_at
 
-FAR = 1e9  # times its start: a mass that the motion does not show at all runs off without end
+FARTHEST = 1e9  # times its start: a mass that the motion does not show at all runs off without end
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def fit_free_run(
     max_iterations: int = 60,
     initial: str | Floats = "estimate",
     continuity: float = 0.0,
-    offset: float = OFFSET,
+    offset: float = RELATIVE_OFFSET,
     noise: tuple[Floats, ...] = (),
     lost: Bools | None = None,
     penalty: Floats | None = None,
@@ -214,7 +214,7 @@ def fit_free_run(
         shown = starting_states(record, outputs, begins, coordinates=model.coordinates)
         states[:, : run.moving] = shown[:, : run.moving]
     measured = outputs.stacked(outputs.measured(record, (first, first + run.samples)))
-    positive = {key: FAR * begin[key] for entry in model.terms for key in entry.positive if key in begin}
+    positive = {key: FARTHEST * begin[key] for entry in model.terms for key in entry.positive if key in begin}
     kept = None if lost is None else outputs.kept(lost[first : first + run.samples])
     coupled = any(t.term.name == "inertia" and t.place.kind != "at" and set(t.keys) & set(begin) for t in model.terms)
     weights = _weights(continuity, measured, states)

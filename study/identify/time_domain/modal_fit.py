@@ -21,8 +21,8 @@ from study.records.prepared import Prepared
 from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import TOLERANCE
 
-TRIALS, TRIED = 30, 6  # free runs of a search; of one with more modes, before it has to be the better
-PATIENCE = 2  # numbers of modes in turn that are no better: more are not tried
+MODAL_RUNS, TRIAL_RUNS = 30, 6  # free runs of a search; of one with more modes, before it has to be the better
+WORSE_IN_TURN = 2  # numbers of modes: more are not tried
 
 
 def with_modal_term(
@@ -70,17 +70,17 @@ def modal_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     worse = 0
     for lines in line_fits(model, prepared):
         worse += 1
-        if worse > PATIENCE:
+        if worse > WORSE_IN_TURN:
             break
         begun = lines.model.with_values({key: model.values[key] for key in model.held_keys})
         held = (*model.held_keys, *lines.modal.coupling)
         try:
             steps = needed_steps(begun, prepared.record, prepared.outputs)
-            fit = fit_part(begun, prepared, held, steps=steps, max_iterations=TRIED)
+            fit = fit_part(begun, prepared, held, steps=steps, max_iterations=TRIAL_RUNS)
         except DivergenceError:
             continue
         if best is None or _criterion(fit) < _criterion(best):
-            fit = fit if fit.converged else _gone_on(fit, prepared, held, TRIED)
+            fit = fit if fit.converged else _gone_on(fit, prepared, held, TRIAL_RUNS)
             best, worse = settled(fit, prepared), 0
     if best is None:
         raise StudyError(f"forces and motions of {prepared.record.name!r} show no mode in the band that is driven")
@@ -100,7 +100,7 @@ def _at_minimum(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return fit
 
 
-def _gone_on(fit: FreeRunFit, prepared: Prepared, held: Collection[str], trials: int = TRIALS) -> FreeRunFit:
+def _gone_on(fit: FreeRunFit, prepared: Prepared, held: Collection[str], trials: int = MODAL_RUNS) -> FreeRunFit:
     """A fit gone on with from where it ended, with other keys held."""
     initial = np.atleast_2d(fit.initial)
     return fit_part(fit.model, prepared, held, steps=fit.steps_per_sample, initial=initial, max_iterations=trials)

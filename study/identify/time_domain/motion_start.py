@@ -20,7 +20,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
-REACH, STEP = 4.0, 0.1  # samples by which a response may be late, tried so far apart
+LATEST, LATE_STEP = 4.0, 0.1  # samples by which a response may be late, tried so far apart
 
 
 def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
@@ -87,7 +87,7 @@ def delay_along_the_motion(model: Model, prepared: Prepared) -> float:
     lines = _as_power(np.stack([*_unit_forces(model, part).values(), _driving(model, part)], axis=2), model, part)
     both = np.concatenate([lines[..., :-1].real, lines[..., :-1].imag]).reshape(-1, lines.shape[2] - 1)
     basis = np.linalg.qr(both / np.maximum(np.linalg.norm(both, axis=0), np.finfo(float).tiny))[0]
-    late = np.arange(-REACH, REACH + STEP, STEP)
+    late = np.arange(-LATEST, LATEST + LATE_STEP, LATE_STEP)
     explained = list[float]()
     for samples in late.tolist():  # one by one: all of them would be many times the record
         turn = np.exp(-2j * np.pi * samples / len(part) * np.arange(len(lines)))

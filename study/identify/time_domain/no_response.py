@@ -14,7 +14,6 @@ from study.support.errors import StudyError
 from study.support.thresholds import ALPHA
 
 SURE = 3.0  # standard errors by which a coefficient must differ from zero to have a sign
-ORDER = ("m", "c", "k")
 
 
 def why_no_response(model: Model, prepared: Prepared) -> str:
@@ -51,7 +50,7 @@ def unfit(model: Model, prepared: Prepared) -> str:
         return str(error)
     if lines.single:
         return one_frequency(_strongest(prepared), prepared)
-    values, errors = solved(lines, ORDER)
+    values, errors = solved(lines, ("m", "c", "k"))
     mass, error = float(values[0]), float(errors[0])
     if mass < -SURE * error and float(values[1]) < SURE * float(errors[1]):
         return (

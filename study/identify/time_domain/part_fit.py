@@ -15,16 +15,16 @@ from study.records.record import ALONE, Sensor
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
-from study.support.levenberg_marquardt import OFFSET
+from study.support.levenberg_marquardt import RELATIVE_OFFSET
 from study.support.statistics import clustered_covariance
 
-FAR = 1e150  # a shift beyond all measure
-STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
+BEYOND_MEASURE = 1e150
+SEARCH_STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 
 
 def rough_steps(model: Model, prepared: Prepared, start: Mapping[str, float]) -> int:
     """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
+    return max(SEARCH_STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
 
 def fit_part(
@@ -33,10 +33,10 @@ def fit_part(
     held: Collection[str],
     start: Mapping[str, float] | None = None,
     *,
-    steps: int = STEPS,
+    steps: int = SEARCH_STEPS,
     max_iterations: int = 60,
     initial: Floats | None = None,
-    offset: float = OFFSET,
+    offset: float = RELATIVE_OFFSET,
     noise: tuple[Floats, ...] = (),
     penalty: Floats | None = None,
 ) -> FreeRunFit:
@@ -117,7 +117,7 @@ def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> 
     try:
         coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
     except DivergenceError:  # a motion that stays finite by the error of its integration alone
-        return FAR * np.ones(jacobian.shape[1])
+        return BEYOND_MEASURE * np.ones(jacobian.shape[1])
     return least_squares(fit.whitened(jacobian), fit.whitened(prepared.outputs.stacked(coarse - fine)))
 
 
@@ -183,7 +183,7 @@ class JudgingRun:
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, 1, fit.model)
         derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
-        if not np.all(np.abs(derivatives) < FAR):
+        if not np.all(np.abs(derivatives) < BEYOND_MEASURE):
             raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
         return _known(derivatives, self.prepared, self.prepared.plan.judge)
 

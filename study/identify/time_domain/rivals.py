@@ -20,7 +20,7 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 from study.support.statistics import block_powers
 
-LEVEL = 0.05  # of both tests: of the sums of squares, and of the distance between the values
+SIGNIFICANCE_LEVEL = 0.05  # of both tests: of the sums of squares, and of the distance between the values
 
 
 def rivals(fit: FreeRunFit, prepared: Prepared) -> tuple[FreeRunFit, ...]:
@@ -96,7 +96,7 @@ def larger(residual: Floats, than: Floats) -> bool:
     count, mean = len(rise), float(np.mean(rise))
     error = float(np.std(rise, ddof=1)) / np.sqrt(count)
     chance = np.asarray(stdtr(count - 1, -mean / max(error, np.finfo(float).tiny)), dtype=np.float64)
-    return mean > 0.0 and float(chance) < LEVEL
+    return mean > 0.0 and float(chance) < SIGNIFICANCE_LEVEL
 
 
 def _apart(one: FreeRunFit, other: FreeRunFit, prepared: Prepared) -> bool:
@@ -110,7 +110,7 @@ def _far(apart: Floats, covariance: Floats) -> bool:
     deviations = np.sqrt(np.diag(covariance))
     scale = np.where(deviations > 0.0, deviations, np.inf)
     distance = apart / scale @ np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True) @ (apart / scale)
-    return bool(distance > chdtri(len(apart), LEVEL))
+    return bool(distance > chdtri(len(apart), SIGNIFICANCE_LEVEL))
 
 
 def _covariance(fit: FreeRunFit, prepared: Prepared) -> Floats:

@@ -12,18 +12,18 @@ from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit, released
 from study.identify.time_domain.motion_start import from_the_motion, seen_everywhere
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
-from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.identify.time_domain.part_fit import SEARCH_STEPS, covariance_of, fit_part, integration_shift, linearise
 from study.identify.time_domain.shooting import slowest_rate
 from study.identify.time_domain.stretch_states import POOR, is_poor
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import DivergenceError, StudyError
 
-PERIODS, STRETCH_LIMITS = 50.0, (512, 2048)  # of motion, and samples, in the stretch where multiple shooting begins
+STRETCH_PERIODS, STRETCH_LIMITS = 50.0, (512, 2048)  # of motion, and samples, where multiple shooting begins
 SHIFT = 0.3  # standard errors by which the integration may shift a coefficient ...
-FINE = 0.05  # ... and where samples were left out: leaving them out is to shift nothing
-ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
-FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
-MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
+SMALL_SHIFT = 0.05  # ... and where samples were left out: leaving them out is to shift nothing
+INTEGRATOR_ORDER = 4  # what it shifts falls with this power of the steps
+LARGEST_EXCESS = 1e6  # times the shift that would matter: more asks for no more steps than this
+MOST_FIT_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
 LOST = 0.5  # of what one free run leaves: where segments leave less, that run has lost the motion
 KEPT = 40  # free runs of a fit that is kept
 
@@ -106,8 +106,8 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     Held ones count too, with the errors that they would have: what the integration does to them is left of the motion.
     Segments are found anew with the steps that they need: the integration's error parts them as a wrong model does.
     """
-    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
-    allowed = SHIFT if prepared.every == 1 else FINE
+    most = max(MOST_FIT_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
+    allowed = SHIFT if prepared.every == 1 else SMALL_SHIFT
     while fit.steps_per_sample < most:
         whole = released(fit)
         jacobian = linearise(whole, prepared)
@@ -117,7 +117,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
             excess = float(np.max(np.abs(moved) / np.maximum(allowed * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:
             break
-        times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
+        times = 2 ** max(1, math.ceil(math.log2(min(excess, LARGEST_EXCESS)) / INTEGRATOR_ORDER))
         steps = min(times * fit.steps_per_sample, most)
         if fit.restarts:
             try:
@@ -142,7 +142,9 @@ def better_fit(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit |
     return other if other.rms <= one.rms else one
 
 
-def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
+def from_segments(
+    model: Model, prepared: Prepared, held: Sequence[str], steps: int = SEARCH_STEPS
+) -> FreeRunFit | None:
     """A fit that begins where multiple shooting ends; None where the model cannot run even in segments.
 
     A motion that is prescribed drifts from nothing: there is nothing to cut. Segments begin with states that sensors
@@ -151,7 +153,7 @@ def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: 
     if prepared.response == FORCE or not seen_everywhere(model, prepared):
         return None
     motions = prepared.measured[slice(*prepared.plan.fit)]
-    length = round(PERIODS * 2.0 * np.pi / (slowest_rate(motions, prepared.dt) * prepared.dt))
+    length = round(STRETCH_PERIODS * 2.0 * np.pi / (slowest_rate(motions, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, *STRETCH_LIMITS)))
     try:
         opened = model.with_values({key: None for key in model.values if key not in held})

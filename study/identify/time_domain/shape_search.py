@@ -32,7 +32,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
 
-PERIODS = 100.0  # of the motion that a search for effects uses, at least
+SEARCH_PERIODS, SEARCH_SAMPLES = 100.0, 2048  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
 VARIED = "quantiles of what it varies with"

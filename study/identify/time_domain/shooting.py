@@ -21,18 +21,18 @@ from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
 GROWTH = 10.0  # factor by which a disturbance may be magnified within a segment
-PERIODS = 1.0  # length of the segments that a search from afar begins with
+SEGMENT_PERIODS = 1.0  # of the motion, with which a search from afar begins
 REACHES = (0.07, 0.15, REACH, 0.3)  # widths of smoothing, in periods, that are tried for the first states
 
 
 def even_restarts(record: Record, outputs: Outputs, span: tuple[int, int]) -> tuple[int, ...]:
-    """Restarts that cut a span into segments of ``PERIODS`` periods of the motion, and where a stretch begins in it."""
+    """Restarts that cut a span into segments of ``SEGMENT_PERIODS`` of the motion, and where a stretch begins in it."""
     first, last = span
     rate = slowest_rate(outputs.measured(record, span), record.dt)
     begins = own_begins(record, span)
     restarts = list[int]()
     for begin, end in pairwise((first, *begins, last)):
-        count = max(1, round((end - begin) * record.dt * rate / (2.0 * np.pi * PERIODS)))
+        count = max(1, round((end - begin) * record.dt * rate / (2.0 * np.pi * SEGMENT_PERIODS)))
         restarts += [int(r) for r in np.linspace(begin, end, count + 1).round()[1:]]
     return tuple(restarts[:-1])
 

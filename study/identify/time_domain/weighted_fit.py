@@ -21,7 +21,7 @@ from study.support.autoregression import autoregression, whitened
 from study.support.errors import DivergenceError
 from study.support.thresholds import TOLERANCE, K
 
-RUNS = 20  # free runs of the weighted fit, which begins at the plain one
+WEIGHTED_RUNS = 20  # free runs of the weighted fit, which begins at the plain one
 
 
 def finished(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -39,7 +39,7 @@ def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     try:
         again = fit_part(
             fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial), noise=noise,
-            max_iterations=RUNS,
+            max_iterations=WEIGHTED_RUNS,
         )  # fmt: skip
     except DivergenceError:
         return fit

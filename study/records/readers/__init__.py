@@ -29,7 +29,7 @@ __all__ = [
 ]  # fmt: skip
 
 SINGLE_MASS = Roles()
-EXPECTED = "expected CSV, MATLAB, HDF5, UFF or Parquet"
+EXPECTED_FORMATS = "expected CSV, MATLAB, HDF5, UFF or Parquet"
 LARGEST_PIPE = 1 << 32  # bytes: what never ends must not fill the disk
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 BINARY = {
@@ -85,8 +85,8 @@ def read_table(path: Path, mapping: ReadOptions | None = None) -> tuple[Table, R
             with source.open("rb") as stream:
                 head = stream.read(1024)  # MATLAB 7.3 begins its HDF5 part behind 512 bytes of its own
         except OSError as error:
-            raise StudyError(f"{path}: cannot be read ({reason(error)}); {EXPECTED}") from None
-        expect(head, f"{path}: the file is empty; {EXPECTED}")
+            raise StudyError(f"{path}: cannot be read ({reason(error)}); {EXPECTED_FORMATS}") from None
+        expect(head, f"{path}: the file is empty; {EXPECTED_FORMATS}")
         if options_beside(path).is_file():
             options = options.over(read_options(options_beside(path)))
         return _table(path, source, head, options), options
@@ -101,14 +101,14 @@ def readable(path: Path) -> Generator[Path, None, None]:
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
-        raise StudyError(f"{path}: there is no such file; {EXPECTED}") from None
+        raise StudyError(f"{path}: there is no such file; {EXPECTED_FORMATS}") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        raise StudyError(f"{str(path)!r}: cannot be read ({reason(error)}); {EXPECTED}") from None
+        raise StudyError(f"{str(path)!r}: cannot be read ({reason(error)}); {EXPECTED_FORMATS}") from None
     if stat.S_ISREG(mode):
         yield path
         return
     kind = "a folder" if stat.S_ISDIR(mode) else "neither a regular file nor a pipe"
-    expect(stat.S_ISFIFO(mode), f"{path}: this is {kind}; {EXPECTED}")
+    expect(stat.S_ISFIFO(mode), f"{path}: this is {kind}; {EXPECTED_FORMATS}")
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / f"pipe{path.suffix}"
         _copied(path, copy)
@@ -126,10 +126,10 @@ def _copied(pipe: Path, copy: Path) -> None:
         with os.fdopen(descriptor, "rb", buffering=0) as source, copy.open("wb") as target:
             while data := _next(source.fileno()):
                 total += target.write(data)
-                expect(total <= LARGEST_PIPE, f"{pipe}: this pipe gave {total} bytes and no end; {EXPECTED}")
+                expect(total <= LARGEST_PIPE, f"{pipe}: this pipe gave {total} bytes and no end; {EXPECTED_FORMATS}")
     except OSError as error:
-        raise StudyError(f"{pipe}: cannot be read ({reason(error)}); {EXPECTED}") from None
-    expect(total, f"{pipe}: nobody writes to this pipe, or nothing is left in it; {EXPECTED}")
+        raise StudyError(f"{pipe}: cannot be read ({reason(error)}); {EXPECTED_FORMATS}") from None
+    expect(total, f"{pipe}: nobody writes to this pipe, or nothing is left in it; {EXPECTED_FORMATS}")
 
 
 def _next(descriptor: int) -> bytes:
@@ -155,9 +155,9 @@ def _kind(path: Path, head: bytes) -> str:
     if head.split(b"\n", 1)[0].strip() == b"-1":
         return "uff"
     if suffix in SUFFIXES:
-        raise StudyError(f"{path}: this is not {SUFFIXES[suffix]}, whatever its name says; {EXPECTED}")
+        raise StudyError(f"{path}: this is not {SUFFIXES[suffix]}, whatever its name says; {EXPECTED_FORMATS}")
     for signature, content in OTHERS.items():
-        expect(not head.startswith(signature), f"{path}: this is {content}; {EXPECTED}")
+        expect(not head.startswith(signature), f"{path}: this is {content}; {EXPECTED_FORMATS}")
     return "text"
 
 
@@ -180,4 +180,6 @@ def _table(path: Path, source: Path, head: bytes, options: ReadOptions) -> Table
         if kind == "text":
             raise
         why = (str(error).splitlines() or [""])[0][:80] or type(error).__name__
-        raise StudyError(f"{path}: the {kind.upper()} file is damaged or cut short ({why}); {EXPECTED}") from None
+        raise StudyError(
+            f"{path}: the {kind.upper()} file is damaged or cut short ({why}); {EXPECTED_FORMATS}"
+        ) from None

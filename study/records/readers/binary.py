@@ -9,7 +9,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from study.records.readers.checks import shortest_decimal
-from study.records.readers.table import NONE, Column, Table, from_arrays, in_group, split_unit
+from study.records.readers.table import NO_VALUES, Column, Table, from_arrays, in_group, split_unit
 from study.support.errors import expect
 from study.support.extras import needed
 
@@ -102,7 +102,7 @@ def read_parquet(path: Path, _group: str | None = None) -> Table:
             columns.append(Column(name, values.astype(np.float64), unit))
         else:
             fault = f"column {name!r} holds {data.type}; expected real numbers"
-            columns.append(Column(name, NONE, unit, fault=fault))
+            columns.append(Column(name, NO_VALUES, unit, fault=fault))
     return Table(tuple(columns))
 
 

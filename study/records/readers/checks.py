@@ -20,10 +20,10 @@ CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
 FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
 JITTER = 0.01  # of the sampling interval: what is uneven by less is even, and what is off by less is the same
-ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed times that still shows a lost sample
+COARSEST_ROUNDING = 0.4  # of the sampling interval: of printed times that still show a lost sample
 CONTENT = 1e-6  # of its maximum: autospectra below are leakage
 COHERENT = 0.3  # lines less coherent than this say little
-FEWEST_LINES = 8
+FEWEST_COHERENT = 8  # lines
 BETTER = 0.7  # the swapped reading must miss by less than this share of what the given one misses by
 
 
@@ -119,7 +119,7 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
     grid = np.arange(len(time), dtype=np.float64)
     away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
     rounding = _rounding(time)
-    if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
+    if away > max(JITTER * mean, min(rounding, COARSEST_ROUNDING * mean)):
         usual, widest = float(np.median(steps)), int(np.argmax(steps))
         worst = int(np.argmax(np.abs(steps - usual)))
         how = f"sampling is uneven ({usual:.6g} s usually, {steps[worst]:.6g} s before {place(worst + 1)})"
@@ -242,7 +242,7 @@ def _lines(record: Record) -> _Lines | None:
     """None where a record is too short or too incoherent to tell."""
     (force,), sensor = record.forces, next(s for m in MOTIONS if (s := Sensor(record.coordinates[0], m)) in record)
     length = min(1024, len(record) // 8)  # 500 lines are plenty for three coefficients
-    if length < 4 * FEWEST_LINES:
+    if length < 4 * FEWEST_COHERENT:
         return None
     matrix = cross_spectra([record[force], record[sensor]], record.dt, Segments(length))
     g, frequency = matrix.density, matrix.frequency
@@ -250,7 +250,7 @@ def _lines(record: Record) -> _Lines | None:
     weight = np.abs(cross) ** 2 / np.maximum(drive * response, np.finfo(float).tiny)
     keep = (weight > COHERENT) & (drive > CONTENT * drive.max()) & (response > CONTENT * response.max())
     keep[:2] = False  # offset and drift
-    if np.count_nonzero(keep) < FEWEST_LINES:
+    if np.count_nonzero(keep) < FEWEST_COHERENT:
         return None
     omega = 2.0 * np.pi * frequency[keep]
     ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])

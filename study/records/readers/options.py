@@ -10,8 +10,8 @@ from study.support.errors import StudyError, at, expect
 from study.support.files import read_text
 from study.support.yaml_text import as_list, as_mapping, read_plain, shown
 
-BESIDE = ".record.yaml"
-WANTED = "a YAML file with 'columns', 'units', 'scale', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
+OPTIONS_SUFFIX = ".record.yaml"
+OPTIONS_FILE = "a YAML file with 'columns', 'units', 'scale', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class ReadOptions:
         )  # fmt: skip
 
 
-KEYS = tuple(option.name for option in fields(ReadOptions))
+OPTION_KEYS = tuple(option.name for option in fields(ReadOptions))
 
 
 def assignments(texts: Sequence[str], option: str) -> dict[str, str]:
@@ -89,18 +89,18 @@ def assignments(texts: Sequence[str], option: str) -> dict[str, str]:
 
 def options_beside(path: Path) -> Path:
     """Where the options of a file may stand: ``rig.record.yaml`` for ``rig.csv``."""
-    return path.with_suffix(BESIDE) if path.name else path
+    return path.with_suffix(OPTIONS_SUFFIX) if path.name else path
 
 
 def read_options(path: Path) -> ReadOptions:
     """Read options from a YAML file."""
-    text = read_text(path, WANTED)
+    text = read_text(path, OPTIONS_FILE)
     with at(path):
         given = as_mapping(read_plain(text) if text.strip() else {})
         if given is None:
             raise StudyError("this is no mapping; expected 'columns: {force: V1, displacement: V2}'")
         for key in given:
-            expect(key in KEYS, f"there is no key {shown(key)}; {', '.join(KEYS)} are known")
+            expect(key in OPTION_KEYS, f"there is no key {shown(key)}; {', '.join(OPTION_KEYS)} are known")
         columns = _mapping(given, "columns").items()
         flags = ("accept_saturated", "accept_swapped", "free", "as_sampled")
         return ReadOptions(

@@ -14,14 +14,14 @@ from functools import cached_property
 from pathlib import Path
 
 from study.records.driven_by_motion import BASE
-from study.records.readers.options import BESIDE, ReadOptions
+from study.records.readers.options import OPTIONS_SUFFIX, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import ALONE, MOTIONS, Sensor
 from study.support.errors import StudyError, expect
 from study.support.units import ROLES, parse_unit
 from study.support.yaml_text import shown
 
-NAMES: dict[str, tuple[str, ...]] = {
+NAMES_OF_ROLES: dict[str, tuple[str, ...]] = {
     "force": ("f", "force", "input", "fin", "forcein", "inputforce", "excitation", "load", "appliedforce"),
     "displacement": ("x", "d", "displacement", "disp", "displ", "position", "pos", "deflection"),
     "velocity": ("v", "velocity", "vel", "speed"),
@@ -30,7 +30,7 @@ NAMES: dict[str, tuple[str, ...]] = {
 }
 
 
-SEPARATOR = re.compile(r"[ ._:/-]+")
+ROLE_SEPARATOR = re.compile(r"[ ._:/-]+")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Roles:
                 return channel
         for coordinate in self.coordinates:
             rest = low.removeprefix(coordinate.lower())
-            motion = _plain_role(rest) if SEPARATOR.match(rest) else "" if rest else kind
+            motion = _plain_role(rest) if ROLE_SEPARATOR.match(rest) else "" if rest else kind
             if low != rest and (not rest or motion in MOTIONS):
                 return str(Sensor(coordinate, motion if motion in MOTIONS else MOTIONS[0]))
         return self.plain.get(low, "")
@@ -124,7 +124,7 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         raise _ask(path, table, roles, f"no column is known to be {missing}{free}")
     # Further channels are columns of the same length with names of their own.
     length, counts = len(next(iter(named.values())).values), Counter(c.name for c in table.columns)
-    known, taken = {"", *named, *NAMES, *roles.kinds}, [id(c) for c in named.values()]
+    known, taken = {"", *named, *NAMES_OF_ROLES, *roles.kinds}, [id(c) for c in named.values()]
     usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
     named |= {c.name: c for c in usable if counts[c.name] == 1 and c.name not in known}
     place = {id(c): k for k, c in enumerate(table.columns)}
@@ -205,7 +205,7 @@ def _last(column: Column) -> str:
 
 def _plain_role(name: str) -> str:
     plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    return next((role for role, names in NAMES.items() if plain in names), "")
+    return next((role for role, names in NAMES_OF_ROLES.items() if plain in names), "")
 
 
 def _unit_role(unit: str) -> str:
@@ -230,5 +230,5 @@ def _ask(path: Path, table: Table, roles: Roles, problem: str) -> StudyError:
     wanted = " ".join(f"--column {channel}=NAME" for channel in (*roles.forces[:1], _motion_of(roles)))
     return StudyError(
         f"{path}: {problem}; the columns are {table.listing()}: name them by {wanted}{choose}, or in "
-        f"{path.stem}{BESIDE}"
+        f"{path.stem}{OPTIONS_SUFFIX}"
     )

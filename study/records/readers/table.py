@@ -15,7 +15,7 @@ from study.support.units import is_unit
 from study.support.yaml_text import excerpt
 
 Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none
-NONE = np.zeros(0)
+NO_VALUES = np.zeros(0)
 RATES = ("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency")
 INTERVALS = ("dt", "ts", "samplingtime", "samplingperiod", "sampletime", "samplinginterval")
 
@@ -118,7 +118,7 @@ def _column(name: str, array: Array, unit: str) -> Column:
     elif array.ndim == 2 and array.shape[0] == array.shape[1]:
         fault = f"has the shape {shape}, samples and periods cannot be told apart; put them end to end"
     if fault:
-        return Column(name, NONE, unit, fault=f"column {name!r} {fault}")
+        return Column(name, NO_VALUES, unit, fault=f"column {name!r} {fault}")
     if array.ndim < 2:
         return Column(name, np.atleast_1d(array).astype(np.float64), unit)
     tall = array if array.shape[0] > array.shape[1] else array.T

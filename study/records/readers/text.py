@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from study.records.number_table import number_table
-from study.records.readers.table import NONE, Column, Table, split_unit
+from study.records.readers.table import NO_VALUES, Column, Table, split_unit
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
@@ -30,7 +30,7 @@ SPACE = " \t"  # what the compiled parser takes for blanks; Python knows more
 DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANKS, "."), (BLANKS, ","))
 COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-EXPECTED = "expected a table with one line for each sample"
+EXPECTED_TABLE = "expected a table with one line for each sample"
 NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
 
 
@@ -63,10 +63,10 @@ def _utf8(path: Path, data: bytes) -> bytes:
     for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig")):
         if data.startswith(mark):
             data = data.decode(encoding, errors="replace").encode("utf-8")
-    expect(data and not data.isspace(), f"{path}: the file is empty; {EXPECTED}")
+    expect(data and not data.isspace(), f"{path}: the file is empty; {EXPECTED_TABLE}")
     odd = NO_TEXT.search(data, 0, HEAD_BYTES)
     byte = odd.start() if odd is not None else data.find(b"\0")
-    expect(byte < 0, f"{path}: this is no text (byte {byte} is {data[byte]:#04x}); {EXPECTED}")
+    expect(byte < 0, f"{path}: this is no text (byte {byte} is {data[byte]:#04x}); {EXPECTED_TABLE}")
     if not data.isascii():
         try:
             data.decode("utf-8")
@@ -141,7 +141,9 @@ def _reading(lines: Sequence[str], delimiter: str, decimal: str) -> _Reading:
 def _layout(path: Path, lines: Sequence[str]) -> TextLayout:
     best = max((_reading(lines, *dialect) for dialect in DIALECTS), key=lambda r: r.score)
     samples = [k for k in best.cells if best.is_sample(k)]
-    expect(best.score and samples, f"{path}: no line with numbers is found among the first {len(lines)}; {EXPECTED}")
+    expect(
+        best.score and samples, f"{path}: no line with numbers is found among the first {len(lines)}; {EXPECTED_TABLE}"
+    )
     above = [k for k in best.cells if k < samples[0]]
     words = [k for k in above if best.numbers(k) == 0 and any(best.cells[k])]
     units = best.cells[words.pop()] if len(words) > 1 and _is_units_row(best.cells[words[-1]]) else []
@@ -236,7 +238,7 @@ def _checked(name: str, unit: str, cells: Sequence[str], decimal: str, place: Pl
     wrong = next((i for i, cell in enumerate(cells) if cell and not _is_number(cell, decimal)), None)
     if wrong is not None:
         fault = f"column {name!r} holds {excerpt(cells[wrong], 30)!r} in {place(wrong)}; expected a number"
-        return Column(name, NONE, unit, fault=fault)
+        return Column(name, NO_VALUES, unit, fault=fault)
     numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in cells)
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
 

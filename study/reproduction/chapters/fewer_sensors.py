@@ -39,7 +39,7 @@ from study.support.errors import StudyError
 from study.support.numbers import percent
 from study.way_in.compare_records import made_ready
 
-KEYS = ["structure", "sensors"]
+BY_SENSORS = ["structure", "sensors"]
 
 
 def make_sensors(_: ClaimSettings, own: SensorSettings, models: Path) -> Tables:
@@ -110,7 +110,7 @@ def _judged(model: Model, record: Record) -> dict[str, Any]:
 
 def _ranked(tables: Tables) -> Iterator[tuple[str, "pd.Series[Any]", "pd.Series[Any]"]]:
     """Of each set of sensors the best candidate and the second best."""
-    for (structure, sensors), group in tables["sensors"].groupby(KEYS, sort=False):
+    for (structure, sensors), group in tables["sensors"].groupby(BY_SENSORS, sort=False):
         ranked = group.sort_values("error")
         yield f"{str(structure).replace('_', ' ')} by {_and(str(sensors))}", ranked.iloc[0], ranked.iloc[1]
 
@@ -146,7 +146,7 @@ def sensors_apart(tables: Tables, expected: Reported) -> Iterator[Condition]:
 def sensors_values(tables: Tables, expected: Reported) -> Iterator[Condition]:
     """Every value of the right model from every set of sensors."""
     limit, t = expected.limit("sensors_value"), tables["sensor_values"]
-    for (structure, sensors), group in t.groupby(KEYS, sort=False):
+    for (structure, sensors), group in t.groupby(BY_SENSORS, sort=False):
         off = group["estimate"] / group["true"] - 1.0
         at = off.abs().idxmax()
         words = f"{str(structure).replace('_', ' ')} by {_and(str(sensors))}"
@@ -189,7 +189,7 @@ def sensors_map(tables: Tables) -> Figure:
 def told_sensors(tables: Tables) -> list[Block]:
     """The worst value from every set of sensors."""
     rows: list[list[str]] = []
-    for (structure, sensors), group in tables["sensor_values"].groupby(KEYS, sort=False):
+    for (structure, sensors), group in tables["sensor_values"].groupby(BY_SENSORS, sort=False):
         off = (group["estimate"] / group["true"] - 1.0).abs()
         at = off.idxmax()
         rows.append([

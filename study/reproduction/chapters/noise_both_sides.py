@@ -45,7 +45,7 @@ from study.reproduction.chapters.chapter import (
     judges,
 )
 from study.reproduction.claims.judgement import Condition, explained
-from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.reported import COEFFICIENTS, Reported
 from study.reproduction.ensemble import NOISE_OFFSET
 from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.document import Block, Text, table
@@ -53,10 +53,9 @@ from study.support.numbers import percent
 
 BY_LEAST_SQUARES, ON_A_FREE_RUN = ("siso", "miso"), ("instrumental", "output_error")
 PERIODIC = "errors_in_variables"
-COEFFICIENTS = ("m", "c", "k", "k3", "c3")
 RANDOM, PERIODIC_FORCE = "random", "repeated"  # forces
 CELL = ["force", "force_noise", "displacement_noise"]
-KEYS = [*CELL, "estimator", "parameter"]
+BY_ESTIMATE = [*CELL, "estimator", "parameter"]
 UNTOLD = (
     "the remainder of the true force, which the measured one does not tell, moves the mass as well: to the motion that "
     "the model follows, the cubic spring and damper add k and c in proportion to the remainder's own motion"
@@ -152,13 +151,13 @@ def _tends_to(model: Model, cell: _Noisy, settings: Settings, name: str) -> dict
 
 def _over_seeds(found: pd.DataFrame, exact: Mapping[str, float]) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
-    for key, group in found.groupby(KEYS, sort=False):
+    for key, group in found.groupby(BY_ESTIMATE, sort=False):
         true, count = exact[str(key[-1])], len(group)
         error = group["estimate"].to_numpy(dtype=np.float64) / true - 1.0
         scatter, squares = float(np.std(error, ddof=1)), error**2
         rms = math.sqrt(float(np.mean(squares)))
         rows.append({
-            **dict(zip(KEYS, key, strict=True)), "true": true, "bias": float(np.mean(error)),
+            **dict(zip(BY_ESTIMATE, key, strict=True)), "true": true, "bias": float(np.mean(error)),
             "bias_error": scatter / math.sqrt(count), "scatter": scatter,
             "predicted": float(group["standard_error"].mean()) / true,
             "theory": float(group["theory"].mean()) / true - 1.0,

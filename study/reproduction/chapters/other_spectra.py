@@ -46,7 +46,7 @@ from study.support.numbers import percent
 DRIVEN_LINES = "miso_driven_lines"
 REVERSE_ESTIMATORS = ("miso", DRIVEN_LINES, "local_polynomial")
 LABELS = {DRIVEN_LINES: "MI/SO, driven lines"}
-NAMES = {
+FORCE_NAMES = {
     "report": "report's noise", "calm": "slight sea", "moderate": "moderate sea", "rough": "rough sea",
     "multisine": "multisine", "sweep": "swept sine", "stepped": "stepped sine", "blows": "blows",
 }  # fmt: skip
@@ -252,7 +252,7 @@ def spectra_bands(tables: Tables, _: Reported) -> list[Condition]:
 
 def spectra_output_error(tables: Tables, _: Reported) -> Iterator[Condition]:
     """A free run under every force, the sensor's noise on the displacement."""
-    return _recovered(tables, "output_error", tuple(NAMES), noisy=True)
+    return _recovered(tables, "output_error", tuple(FORCE_NAMES), noisy=True)
 
 
 def spectra_bands_output_error(tables: Tables, _: Reported) -> Iterator[Condition]:
@@ -307,7 +307,8 @@ def spectra_siso_changes(tables: Tables, expected: Reported) -> Iterator[Conditi
     allowed = expected.value("spectra_siso_changes.change")
     yield Condition(
         f"k of the forces differs by more than {percent(allowed)} of its mean",
-        f"k from {own.min():.4g} ({NAMES[str(own.idxmin())]}) to {own.max():.4g} N/m ({NAMES[str(own.idxmax())]})",
+        f"k from {own.min():.4g} ({FORCE_NAMES[str(own.idxmin())]}) to "
+        f"{own.max():.4g} N/m ({FORCE_NAMES[str(own.idxmax())]})",
         bool(share > allowed),
     )
 
@@ -319,7 +320,7 @@ def spectra_map(tables: Tables) -> Figure:
     """The worst parameter of every force and system, in tolerances, by each estimator."""
     worst = worst_by_system(tables["excitations"])
     panels = [("miso", False), (DRIVEN_LINES, False), ("local_polynomial", False), ("output_error", True)]
-    forces = [*NAMES, *_bands(tables)]
+    forces = [*FORCE_NAMES, *_bands(tables)]
     figure, axes = page.empty_page(
         "Forces with other spectra",
         "error of the worst parameter over its tolerance; above 1 it is not recovered", rows=2, columns=2, width=13.0,
@@ -448,7 +449,7 @@ def _narrowest(rows: pd.DataFrame) -> str:
 
 
 def _words(force: str) -> str:
-    return NAMES.get(force) or f"{force.split()[0]}-octave noise"
+    return FORCE_NAMES.get(force) or f"{force.split()[0]}-octave noise"
 
 
 CHAPTER = Chapter(

@@ -5,14 +5,19 @@ from dataclasses import asdict
 
 import pandas as pd
 
-from study.reproduction.claims import dead_band, identification, levels, preliminary_claims, simulation
 from study.reproduction.claims.conditions import stated
+from study.reproduction.claims.dead_band import DEAD_BAND_CLAIMS
 from study.reproduction.claims.evidence import Evidence
+from study.reproduction.claims.identification import IDENTIFICATION_CLAIMS
 from study.reproduction.claims.judgement import Claim, Conditions, conclude
+from study.reproduction.claims.levels import LEVEL_CLAIMS
+from study.reproduction.claims.preliminary_claims import PRELIMINARY_CLAIMS
 from study.reproduction.claims.reported import INPUT_VARIANCES, LIMIT, NOISE_LEVELS, Reported
+from study.reproduction.claims.simulation import SIMULATION_CLAIMS
 
-MODULES = (simulation, preliminary_claims, identification, dead_band, levels)
-CLAIMS: dict[str, Conditions] = {name: found for section in MODULES for name, found in section.CLAIMS.items()}
+CLAIMS: dict[str, Conditions] = (
+    SIMULATION_CLAIMS | PRELIMINARY_CLAIMS | IDENTIFICATION_CLAIMS | DEAD_BAND_CLAIMS | LEVEL_CLAIMS
+)
 # Rows whose value the claims in code and the reading of unit variance ask for.
 TABLE_1 = {
     "linear": "k c f_n zeta", "duffing": "k c f_n zeta k3 c3", "van_der_pol": "k c f_n zeta k3 c3",

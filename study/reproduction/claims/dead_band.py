@@ -29,7 +29,7 @@ from study.support.numbers import percent
 
 SYSTEM = "dead_band"
 AS_DUFFING = Assumed(plus=("cubic_stiffness",), minus=("dead_band",))
-SURE = 2.0  # standard errors by which one reading must be the nearer one; otherwise there is a tie
+NEARER = 2.0  # standard errors by which one reading must be the nearer one; otherwise there is a tie
 
 
 def line_errors(outcome: Outcome, true: float) -> Floats:
@@ -179,7 +179,7 @@ def extreme_linear(evidence: Evidence, reported: Reported) -> Iterator[Condition
     yield from recovered(evidence, reported, ensemble, ("m", "c", "k"))
 
 
-CLAIMS = claims(
+DEAD_BAND_CLAIMS = claims(
     dead_band_as_duffing, dead_band_not_invariant, dead_band_linear, dead_band_stiffness, dead_band_error,
     dead_band_share, dead_band_coherence, linear_dominates, extreme_siso, extreme_linear,
 )  # fmt: skip
@@ -223,6 +223,6 @@ def both_readings(evidence: Evidence, reported: Reported) -> pd.DataFrame:
         distances = {reading: abs(sample.mean - target) for reading, sample in samples.items()}
         first, second = samples.values()
         apart = abs(distances[READINGS[0]] - distances[READINGS[1]])
-        sure = apart >= SURE * first.minus(second).error  # seed by seed: both readings have the same seeds
+        sure = apart >= NEARER * first.minus(second).error  # seed by seed: both readings have the same seeds
         rows.append({**row, "nearer": min(distances, key=lambda reading: distances[reading]) if sure else "tie"})
     return pd.DataFrame(rows)

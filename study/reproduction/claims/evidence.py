@@ -23,7 +23,7 @@ from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-KEPT = 20  # ensembles of records held at a time, 7 MB each: so many that few are simulated twice
+ENSEMBLES_KEPT = 20  # at a time, 7 MB each: so many that few are simulated twice
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Evidence:
         first = settings.ensembles.first_seed
         self.seeds = range(first, first + settings.ensembles.seeds)
         self.segments = settings.segments.segments()
-        self.records: Callable[[Drive], tuple[Record, ...]] = lru_cache(KEPT)(self._records)
+        self.records: Callable[[Drive], tuple[Record, ...]] = lru_cache(ENSEMBLES_KEPT)(self._records)
         self._ensembles = cache(self._identified)
 
     def model(self, drive: Drive) -> Model:

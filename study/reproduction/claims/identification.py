@@ -350,7 +350,7 @@ def mathieu_histogram(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     )  # fmt: skip
 
 
-CLAIMS = claims(
+IDENTIFICATION_CLAIMS = claims(
     coherence_forms, averages, resolution, hanning, overlap, linear_same, linear_leakage, added_terms, siso_frequency,
     siso_wrong, duffing_cubic, duffing_share, van_der_pol_damping, van_der_pol_share, combined_cubic,
     combined_histogram, combined_nearly_linear, mathieu_third, mathieu_side_resonances, mathieu_siso_coherence,

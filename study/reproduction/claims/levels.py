@@ -12,13 +12,12 @@ from study.records.excitation import Excitation, displacement_noise, force, theo
 from study.reproduction.claims.conditions import recovered
 from study.reproduction.claims.evidence import Analysis, Assumed, Drive, Ensemble, Evidence, Outcome
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together, within_share
-from study.reproduction.claims.reported import COMBINED, Reported
+from study.reproduction.claims.reported import COEFFICIENTS, COMBINED, Reported
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
 from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 
-PARTS = ("m", "c", "k", "k3", "c3")
 SPECTRA = {
     "Pierson-Moskowitz": "pierson_moskowitz",
     "random-phase multisine": "random_phase_multisine",
@@ -71,10 +70,10 @@ def _biases(ensemble: Ensemble, reported: Reported, names: tuple[str, ...]) -> d
 def noise_random_only(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Bias of every parameter at every noise level against the scatter of its mean."""
     conditions: list[Condition] = []
-    clean = _biases(evidence.at(COMBINED), reported, PARTS)
+    clean = _biases(evidence.at(COMBINED), reported, COEFFICIENTS)
     for noise in reported.noises:
         shifts: list[Condition] = []
-        for name, bias in _biases(evidence.at(COMBINED, noise=noise), reported, PARTS).items():
+        for name, bias in _biases(evidence.at(COMBINED, noise=noise), reported, COEFFICIENTS).items():
             shift = bias.minus(clean[name])
             measured, met = f"{name} {percent(shift.mean, '+.3g', shift.error)}", abs(shift.mean) <= 3.0 * shift.error
             criterion = f"mean shift of {name} within 3 standard errors of zero"
@@ -98,7 +97,7 @@ def noise_output(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
         return evidence.analyse(model, records[index].with_channels({"force": noisy})).miso
 
     analyses = threaded(analysis, range(len(records)))
-    for name in PARTS:
+    for name in COEFFICIENTS:
         true, allowed = reported.table_1(COMBINED, name), evidence.tolerance(COMBINED, name)
         bias = Sample(tuple(a.values[name] / true - 1.0 for a in analyses))
         ratio = average([a.errors[name] for a in analyses]) / (bias.scatter * true)
@@ -133,7 +132,7 @@ def noise_random(evidence: Evidence, reported: Reported) -> list[Condition]:
     ensembles = _with_noise(evidence, reported)
     return [
         _rises(f"scatter of {n}", {v: e.miso(n).scatter for v, e in ensembles.items()}, n, f"scatter of {n}")
-        for n in PARTS
+        for n in COEFFICIENTS
     ]
 
 
@@ -232,7 +231,7 @@ def small(name: str, bias: Sample, most: float) -> Condition:
 def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dict[str, Sample]:
     """Relative error of each parameter against its exact value."""
     drive, settings = Drive(COMBINED, noise=noise), evidence.estimator_settings()
-    model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*PARTS, "f_n")}
+    model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*COEFFICIENTS, "f_n")}
     identified = threaded(lambda r: instrumental(model, r, settings), evidence.records(drive))
     estimates = [{p.name: p.value for p in i.parameters} for i in identified]
     return {n: Sample.own_first(e[n] / true - 1.0 for e in estimates) for n, true in truth.items()}
@@ -244,7 +243,7 @@ def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dic
 def conclusion_3(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Two terms that the combined system does not have, assumed beside its own."""
     ensemble = evidence.ensemble(Drive(COMBINED), Assumed(plus=("quadratic_stiffness", "quintic_stiffness")))
-    conditions = recovered(evidence, reported, ensemble, PARTS)
+    conditions = recovered(evidence, reported, ensemble, COEFFICIENTS)
     for name in ("k2", "k5"):
         sample = ensemble.miso(name)
         met = abs(sample.mean) <= 2.0 * sample.scatter
@@ -262,12 +261,12 @@ def conclusion_4(evidence: Evidence, reported: Reported) -> list[Condition]:
     density = theoretical_autospectrum(Excitation("pierson_moskowitz"), frequency, sampling.samples, sampling.dt)
     low = float(frequency[np.argmax(density > 0.1 * np.max(density))])  # where it exceeds a tenth of its peak
     excited = evidence.ensemble(drives["Pierson-Moskowitz"], Assumed(band=(low, high)))
-    left = ", ".join(condition.measured for condition in recovered(evidence, reported, excited, PARTS))
+    left = ", ".join(condition.measured for condition in recovered(evidence, reported, excited, COEFFICIENTS))
     return explained(
         f"lines that the force hardly excites hold leakage; fitted from {low:.1f} Hz on, where the Pierson-Moskowitz "
         f"force begins, {left} are left; a sweep, which is not stationary, excites each line in one or two segments "
         "only",
-        [together(label, recovered(evidence, reported, e, PARTS)) for label, e in ensembles.items()],
+        [together(label, recovered(evidence, reported, e, COEFFICIENTS)) for label, e in ensembles.items()],
     )
 
 
@@ -294,14 +293,14 @@ def conclusion_5_noise(evidence: Evidence, reported: Reported) -> list[Condition
     """Each parameter under the lowest noise within 5 %."""
     noise = reported.noises[0]
     conditions: list[Condition] = []
-    for name in PARTS:
+    for name in COEFFICIENTS:
         ratio = evidence.at(COMBINED, noise=noise).miso(name).scaled(1.0 / reported.table_1(COMBINED, name))
         text = f"{percent(noise)} noise: {name} {percent(ratio.mean - 1.0, '+.3g', ratio.error)}"
         conditions.append(Condition(f"mean {name} within 5 %", text, abs(ratio.mean - 1.0) <= 0.05, text))
     return explained("noise on u biases the reverse estimate, most where the response is weak", conditions)
 
 
-CLAIMS = claims(
+LEVEL_CLAIMS = claims(
     levels_similar, noise_random_only, noise_output, noise_random, noise_linear, noise_cubic, noise_coherence,
     noise_instruments, conclusion_3, conclusion_4, conclusion_5_noise,
 )  # fmt: skip

@@ -207,7 +207,7 @@ def mathieu_pattern(evidence: Evidence, reported: Reported) -> Iterator[Conditio
         yield within_share(f"slope in the {half} half period", found, expected, reported.limit("by_eye"))
 
 
-CLAIMS = claims(
+PRELIMINARY_CLAIMS = claims(
     nonlinear_is_not, narrow_band, harmonics, mathieu_lines, mathieu_fast, oval_width, patterns_alike,
     van_der_pol_pattern, combined_pattern, mathieu_pattern,
 )  # fmt: skip

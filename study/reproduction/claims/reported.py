@@ -14,6 +14,7 @@ from study.support.errors import StudyError, expect
 
 SYSTEMS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")
 COMBINED = "duffing_van_der_pol"
+COEFFICIENTS = ("m", "c", "k", "k3", "c3")  # of the combined system
 LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
 PARAMETERS = (*LINEAR_PARTS, "k3", "c3", "k_m", "k_dead_band")
 INPUT_VARIANCES = ("lowest", "second", "third", "highest")  # input variances of Section 5.3

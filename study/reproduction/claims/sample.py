@@ -14,7 +14,6 @@ from study.support.arrays import Floats
 from study.support.numbers import percent
 from study.support.thresholds import ALPHA
 
-SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
 GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))  # of a Gaussian's values: within half a standard deviation
 GAUSSIAN_OUTER_SHARE = math.erfc(2.0 / math.sqrt(2.0))  # of a Gaussian's values: beyond two standard deviations
 
@@ -106,7 +105,7 @@ def effective_size(values: Floats) -> float:
 
 def is_gaussian(values: Floats) -> bool:
     """Whether the kurtosis is one that a Gaussian process may well show (5 % level)."""
-    return abs(gaussian_score(values)) <= SIGNIFICANT
+    return abs(gaussian_score(values)) <= 1.96  # two-sided 5 % of the standard normal
 
 
 def central_share(values: Floats) -> float:

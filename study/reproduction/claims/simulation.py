@@ -182,7 +182,7 @@ def exact_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Conditio
     )  # fmt: skip
 
 
-CLAIMS = claims(
+SIMULATION_CLAIMS = claims(
     system_stiffness_gap, amplitude_nonlinear, nyquist, lowpass, force_gaussian, below_10_hz, error_free,
     noise_uncorrelated, table_1, exact_stiffness,
 )  # fmt: skip
