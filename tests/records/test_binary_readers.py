@@ -11,6 +11,7 @@ import pytest
 import pyuff
 from scipy.io import savemat
 
+import study as st
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Record
 from study.support.errors import StudyError
@@ -208,6 +209,9 @@ def test_cells_of_each_channel_are_chosen_by_their_number_and_share_the_rate_bes
     np.testing.assert_array_equal(record["force"], 2.0 * FORCE)
     np.testing.assert_array_equal(record["displacement"], 2.0 * DISPLACEMENT)
     assert (record.name, record.dt) == ("rig_2", 0.02)
+    (tmp_path / "rig.record.yaml").write_text("group: 2\n")
+    for again in (st.read(tmp_path / "rig.mat"), st.read(tmp_path / "rig.mat", group=2)):
+        np.testing.assert_array_equal(again["force"], record["force"])
 
 
 def test_each_cell_of_matlab_7_3_is_a_record(tmp_path: Path) -> None:
