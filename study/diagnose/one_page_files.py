@@ -121,7 +121,7 @@ def _first(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """As many rows as the page holds, and how many more there are."""
     if len(rows) <= _Sheet.most:
         return list(rows)
-    return [*rows[: _Sheet.most - 1], (f"and {len(rows) - _Sheet.most + 1} more", "in diagnosis.json", "", "", "")]
+    return [*rows[: _Sheet.most - 1], (f"and {len(rows) - _Sheet.most + 1} more", "from study compare", "", "", "")]
 
 
 def _joined(notes: Sequence[str]) -> str:
@@ -159,7 +159,7 @@ class _Sheet:
 
     width, height, margin = 8.27, 11.69, 0.7  # A4
     size, leading = 8.5, 1.35  # of letters; lines to their size
-    most = 18  # coefficients: the file beside the page has all
+    most = 18  # coefficients
 
     @classmethod
     def inner(cls) -> float:

@@ -31,6 +31,8 @@ def test_the_page_says_what_is_missing_before_and_after(content):
     assert content.after.prediction.error < content.before.prediction.error
     assert [row[0] for row in content.coefficients] == ["m", "c", "k", "c2"]
     assert "were tried" in content.says[1]
+    assert "is missing" in content.says[0]
+    assert "interval" not in content.says[0]  # the table has the one of the finished fit, and no second one is shown
 
 
 def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
