@@ -11,7 +11,7 @@ from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
-from study.support.numbers import by_chance, digits_between, enumerated, percent
+from study.support.numbers import by_chance, digits_between, enumerated, in_one_notation, percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -188,7 +188,8 @@ def _amount(effect: FittedEffect) -> str:
     """Coefficient and shape parameters with their errors."""
     low, high = effect.interval
     digits = digits_between(effect.coefficient, high - low)
-    said = f"{effect.coefficient:.{digits}g} {effect.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+    coefficient, low_end, high_end = in_one_notation((effect.coefficient, low, high), digits)
+    said = f"{coefficient} {effect.unit} (95 % interval {low_end} to {high_end})"
     parts = [
         f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
         for name, value in effect.parameters.items()
