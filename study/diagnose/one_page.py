@@ -125,5 +125,5 @@ def _errors(before: Comparison, after: Comparison | None) -> tuple[tuple[str, st
         row("noise floor", [percent(c.prediction.floor) for c in both]),
     ]
     if all(c.forces for c in both) and not before.prepared.free:
-        rows.append(row("power of the force unexplained", [percent(c.force_error) for c in both]))
+        rows.append(row("power of the force unexplained, with leakage", [percent(c.force_error) for c in both]))
     return tuple(rows)
