@@ -47,6 +47,14 @@ def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
     assert one_page_files._first(content.coefficients)[-1][0] == "and 2 more"
 
 
+def test_of_records_with_the_same_times_the_one_that_is_shown_is_drawn():
+    time, wave = np.tile(np.arange(0.0, 3.0, 0.1), 3), np.arange(90.0) % 31.0
+    shown = slice(34, 40)
+    same = one_page_files.same_motion(time, wave, time[shown], wave[shown])
+    np.testing.assert_array_equal(same, np.arange(34, 40))
+    assert len(one_page_files.same_motion(time, wave, np.array([7.0]), np.array([0.0]))) == 0
+
+
 def test_lines_are_no_wider_than_the_sheet():
     font = FontProperties(size=9.0)
     words = "the error of the response falls from 69.2 % to 0.342 % " * 5
