@@ -32,7 +32,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
         "--candidate", action="append", default=[], metavar="NAME=FORMULA",
         help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
-    parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
+    parser.add_argument("--without", action="append", default=[], metavar="TERM", help="do not try this effect")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

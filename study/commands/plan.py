@@ -33,9 +33,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--precision", type=_precision, metavar="KEY=PERCENT",
-        help="ask for the test that tells a value closely enough: k3=5%% for a 95 %% interval of k3 within 5 %%",
+        help="ask for the test that determines a value closely enough: k3=5%% for a 95 %% interval of k3 within 5 %%",
     )  # fmt: skip
-    parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
+    parser.add_argument("--without", action="append", default=[], metavar="TERM", help="do not try this effect")
 
 
 def _precision(text: str) -> tuple[str, float]:

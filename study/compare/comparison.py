@@ -193,11 +193,21 @@ def compare(
         fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
     )
     unlike = unlike_in_words(unlike_records(fit, prepared), fit.model, prepared.record)
-    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit), unlike]
+    said = [_why_in_segments(fit, prepared), rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit), unlike,
+            _ended_at(fit, prepared)]  # fmt: skip
     return Comparison(
         model=model, prepared=prepared, fit=fit, found=found, notes=(*prepared.notes, *filter(None, said)),
         estimator=estimator, **judged,
     )  # fmt: skip
+
+
+def _ended_at(fit: FreeRunFit, prepared: Prepared) -> str:
+    """Where the fit ended that began at a mode named by the user: a stronger one beside it may have drawn it away."""
+    m, k = (fit.model.numbers().get(key, 0.0) for key in ("m", "k"))
+    if not prepared.near or min(m, k) <= 0.0:
+        return ""
+    ended = math.sqrt(k / m) / (2.0 * math.pi)
+    return f"the fit began at the mode near {prepared.near:g} Hz (--near) and ended at {ended:.4g} Hz"
 
 
 def _why_in_segments(fit: FreeRunFit, prepared: Prepared) -> str:

@@ -17,7 +17,7 @@ from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.identify.time_domain.rivals import larger
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.support.numbers import digits_between, percent
+from study.support.numbers import digits_between, in_one_notation, percent
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ def value_and_interval(found: Coefficient) -> tuple[str, str]:
         return f"{found.value:.5g}", "held"
     low, high = found.interval
     digits = digits_between(found.value, high - low)
-    return f"{found.value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
+    value, low_end, high_end = in_one_notation((found.value, low, high), digits)
+    return value, f"{low_end} to {high_end}"
 
 
 def found_by(fit: FreeRunFit, prepared: Prepared) -> Estimate:

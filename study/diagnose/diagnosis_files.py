@@ -20,9 +20,9 @@ from study.support.extras import undrawn
 from study.support.numbers import enumerated
 
 
-def diagnosis_in_words(diagnosis: Diagnosis) -> str:
-    """A diagnosis in sentences, with the test that would tell tied candidates apart."""
-    said = diagnosis_sentences(diagnosis)
+def diagnosis_in_words(diagnosis: Diagnosis, amounts: bool = True) -> str:
+    """A diagnosis in sentences, with the test that would tell tied candidates apart; ``amounts`` as for these."""
+    said = diagnosis_sentences(diagnosis, amounts)
     if diagnosis.answer is not None:
         said.append(advice_in_words(suggested(diagnosis)))
     said += [f"{note[0].upper()}{note[1:]}." for note in choices_in_words(diagnosis.comparison.notes)]

@@ -11,7 +11,7 @@ from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
-from study.support.numbers import by_chance, digits_between, enumerated, percent
+from study.support.numbers import by_chance, digits_between, enumerated, in_one_notation, percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -19,15 +19,15 @@ NAMED = 3  # effects that cannot be told apart, before the others are counted
 NAMED_WITHIN = 0.05  # families this close to the best one are named with it
 
 
-def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
-    """What to tell the engineer."""
+def diagnosis_sentences(diagnosis: Diagnosis, amounts: bool = True) -> list[str]:
+    """What to tell the engineer; without the ``amounts`` of what is missing where a table beside the words has them."""
     if diagnosis.verdict == NOTHING:
         return [_nothing(diagnosis)]
     match diagnosis.verdict:
         case verdict.MISSING:
-            said = _missing(diagnosis)
+            said = _missing(diagnosis, amounts)
         case verdict.SEVERAL | verdict.PARTLY_KNOWN:
-            said = _several(diagnosis, diagnosis.sets[0])
+            said = _several(diagnosis, diagnosis.sets[0], amounts)
         case _:
             said = [_misses_much(diagnosis)] if diagnosis.misses_much else _unknown(diagnosis)
     if diagnosis.ended_at is not None:
@@ -84,7 +84,7 @@ def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:
     return f"{errors[0]} to {errors[1]}"
 
 
-def _missing(diagnosis: Diagnosis) -> list[str]:
+def _missing(diagnosis: Diagnosis, amounts: bool) -> list[str]:
     first = diagnosis.candidates[0]
     words, where = term_names(first.term.name), first.entry.place
     placed = f" {place_in_words(where)}" if where.label else ""
@@ -94,8 +94,9 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
         else f"The model lacks {first.term.meaning}{placed}.",
         f"With it the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, first)}; the "
         f"noise floor is {percent(first.prediction.floor)}.",
-        f"{_its_coefficient(first.entry)} {_amount(first.effect)}.",
     ]
+    if amounts:
+        said.append(f"{_its_coefficient(first.entry)} {_amount(first.effect)}.")
     rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is still unexplained beside it, and is not noise.")
@@ -110,7 +111,7 @@ def _its_coefficient(entry: ModelTerm) -> str:
     return "Its coefficient is" if entry.term.variation is None else "The largest change is"
 
 
-def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
+def _several(diagnosis: Diagnosis, answer: Ranked, amounts: bool) -> list[str]:
     effects = enumerated([_with_alike(e.entry, diagnosis) for e in answer.effects])
     one = len(answer.effects) == 1
     are, them, their = ("is", "it", "Its coefficient is") if one else ("are", "them", "Their coefficients are")
@@ -119,8 +120,9 @@ def _several(diagnosis: Diagnosis, answer: Ranked) -> list[str]:
         f"{effects[0].upper()}{effects[1:]} {are} missing{nameless}.",
         f"With {them} the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, answer)}; "
         f"the noise floor is {percent(answer.prediction.floor)}.",
-        f"{their} {enumerated([_amount(e) for e in answer.effects])}.",
     ]
+    if amounts:
+        said.append(f"{their} {enumerated([_amount(e) for e in answer.effects])}.")
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
@@ -186,7 +188,8 @@ def _amount(effect: FittedEffect) -> str:
     """Coefficient and shape parameters with their errors."""
     low, high = effect.interval
     digits = digits_between(effect.coefficient, high - low)
-    said = f"{effect.coefficient:.{digits}g} {effect.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+    coefficient, low_end, high_end = in_one_notation((effect.coefficient, low, high), digits)
+    said = f"{coefficient} {effect.unit} (95 % interval {low_end} to {high_end})"
     parts = [
         f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
         for name, value in effect.parameters.items()

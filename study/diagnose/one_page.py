@@ -50,8 +50,8 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
     """The page of a diagnosis of one or several records; what is missing is added and fitted for it."""
     before = diagnosis.comparison
     after = None if diagnosis.answer is None else added_candidate(before, diagnosis.answer)
-    effects = "" if diagnosis.answer is None else enumerated([effect_in_words(e) for e in diagnosis.answer.entries])
-    one = diagnosis.answer is not None and len(diagnosis.answer.entries) == 1
+    entries = () if diagnosis.answer is None else diagnosis.answer.entries
+    effects, one = enumerated([effect_in_words(entry) for entry in entries]), len(entries) == 1
     if diagnosis.verdict == "partly_known":
         effects += " is" if one else " are"
     headline = HEADLINES[diagnosis.verdict].format(effects=effects)
@@ -64,13 +64,15 @@ def one_page(diagnosis: Diagnosis, faults: Sequence[Fault] = ()) -> OnePage:
         (c.key, term_names(c.term), *value_and_interval(c), c.unit)
         for c in shown.coefficients
     ]  # fmt: skip
+    # The table's are of a finished fit; where it may have no room for them the words keep those of the search.
+    amounts = before.model.named or any(entry.term.variation for entry in entries)
     return OnePage(
         headline[0].upper() + headline[1:],
         described(before.record),
         equation_in_symbols(before.model, before.prepared.free),
         "" if after is None else equation_in_symbols(after.model, after.prepared.free),
         _errors(before, after),
-        (diagnosis_in_words(diagnosis), _how_sure(diagnosis)),
+        (diagnosis_in_words(diagnosis, amounts), _how_sure(diagnosis)),
         tuple(rows),
         (*(fault.says for fault in faults), *(n for n in before.notes if n not in choices_in_words(before.notes))),
         f"study {__version__}",
@@ -123,5 +125,5 @@ def _errors(before: Comparison, after: Comparison | None) -> tuple[tuple[str, st
         row("noise floor", [percent(c.prediction.floor) for c in both]),
     ]
     if all(c.forces for c in both) and not before.prepared.free:
-        rows.append(row("power of the force unexplained", [percent(c.force_error) for c in both]))
+        rows.append(row("power of the force unexplained, with leakage", [percent(c.force_error) for c in both]))
     return tuple(rows)

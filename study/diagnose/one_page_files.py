@@ -20,7 +20,7 @@ from study.equations import dimensions
 from study.figures import page
 from study.figures.styles import in_style
 from study.records.spectra import Segments, cross_spectra_within
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
 
 PRINTED = """\
 @page { size: A4; margin: 14mm }
@@ -54,7 +54,7 @@ def draw(axes: Sequence[Axes], content: OnePage) -> None:
     left: list[tuple[str, SensorPrediction, str, Any]] = [("left by the model as given", shown, "0.1", (0, (3, 1.5)))]
     if after is not None:
         better = after.prediction.of(worst)
-        same = np.isin(better.time, shown.time[near])
+        same = same_motion(better.time, better.measured, shown.time[near], shown.measured[near])
         axes[0].plot(better.time[same], better.predicted[same], color="C0", label="with what is missing")
         left.append(("left with what is missing", better, "C0", "-"))
     axes[0].set_title("close-up where most is missing")
@@ -75,6 +75,18 @@ def draw(axes: Sequence[Axes], content: OnePage) -> None:
     axes[0].set_ylim(low, high + 0.45 * (high - low))  # room for the legend
     top = axes[1].get_ylim()[1]
     axes[1].set_ylim(top=30.0 * top)
+
+
+def same_motion(time: Floats, measured: Floats, shown_time: Floats, shown: Floats) -> Ints:
+    """Samples at the times that are shown: of records whose times overlap those of the one that was measured so."""
+    found = np.flatnonzero(np.isin(time, shown_time)).astype(np.int64)
+    runs: list[Ints] = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+    values = dict(zip(shown_time.tolist(), shown.tolist(), strict=True))
+
+    def apart(run: Ints) -> float:
+        return float(np.mean([(measured[i] - values[time[i]]) ** 2 for i in run]))
+
+    return min(runs, key=apart) if len(found) else found
 
 
 def _spectrum(values: Floats, content: OnePage) -> tuple[Floats, Floats]:
@@ -121,7 +133,7 @@ def _first(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """As many rows as the page holds, and how many more there are."""
     if len(rows) <= _Sheet.most:
         return list(rows)
-    return [*rows[: _Sheet.most - 1], (f"and {len(rows) - _Sheet.most + 1} more", "in diagnosis.json", "", "", "")]
+    return [*rows[: _Sheet.most - 1], (f"and {len(rows) - _Sheet.most + 1} more", "from study compare", "", "", "")]
 
 
 def _joined(notes: Sequence[str]) -> str:
@@ -159,7 +171,7 @@ class _Sheet:
 
     width, height, margin = 8.27, 11.69, 0.7  # A4
     size, leading = 8.5, 1.35  # of letters; lines to their size
-    most = 18  # coefficients: the file beside the page has all
+    most = 18  # coefficients
 
     @classmethod
     def inner(cls) -> float:

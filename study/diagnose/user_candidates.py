@@ -25,13 +25,13 @@ def own_candidates(given: Sequence[str], model: Model) -> list[Term]:
     for text in given:
         name, sign, formula = text.partition("=")
         expect(sign, f"{text!r} is no candidate; expected NAME=FORMULA such as 'bracket=u*abs(u)'")
-        with at(f"--candidate {text}"):
+        with at(f"candidate {text}"):
             term = custom(name.strip(), formula.strip())
-        expect(term.name not in model, f"--candidate {text}: the model has a term {term.name!r}; expected another name")
+        expect(term.name not in model, f"candidate {text}: the model has a term {term.name!r}; expected another name")
         taken = any(term.name == other.name for other in terms)
-        expect(not taken, f"--candidate {text}: two candidates are called {term.name!r}; expected a name for each")
+        expect(not taken, f"candidate {text}: two candidates are called {term.name!r}; expected a name for each")
         fault = repeated_force(model.with_term(term))
-        expect(fault is None, f"--candidate {text}: {fault}")
+        expect(fault is None, f"candidate {text}: {fault}")
         terms.append(term)
     return terms
 

@@ -140,7 +140,7 @@ def read(
     scale: Mapping[str, float] | None = None,
     fs: float | None = None,
     dt: float | None = None,
-    group: str | None = None,
+    group: str | int | None = None,
     samples: tuple[int, int | None] | None = None,
     period: int | None = None,
     accept_saturated: bool = False,
@@ -164,8 +164,8 @@ def read(
         the force has the wrong sign, ``{"force": 31.0}`` beside ``units={"force": "N"}`` for the current of a motor.
     fs, dt : float, optional
         Sampling rate in hertz, or interval in seconds, if there is no column of times.
-    group : str, optional
-        Folder of an HDF5 file, or structure of a MATLAB file, that holds the channels.
+    group : str or int, optional
+        Folder of an HDF5 file, structure or cell of a MATLAB file, that holds the channels.
     samples : pair of int, optional
         The first sample, counted from 0, and the one after the last.
     period : int, optional
@@ -190,8 +190,8 @@ def read(
     from study.records.readers import ReadOptions, read_record
 
     options = ReadOptions(
-        dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped,
-        free=free, scale=dict(scale or {}),
+        dict(columns or {}), dict(units or {}), dt, fs, None if group is None else str(group), samples, period,
+        accept_saturated, accept_swapped, free=free, scale=dict(scale or {}),
     )  # fmt: skip
     found = (
         read_record(Path(path), options) if model is None else read_record(Path(path), options, model.equation.roles)

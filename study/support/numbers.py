@@ -29,6 +29,14 @@ def digits_between(value: float, width: float) -> int:
     return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
 
 
+def in_one_notation(values: Sequence[float], digits: int) -> list[str]:
+    """Numbers in so many digits; all without an exponent where one digit more spares it: ``99931`` and ``100070``."""
+    shown = [f"{value:.{digits}g}" for value in values]
+    spared = [f"{float(text):.{digits + 1}g}" for text in shown]
+    mixed = len({"e+" in text for text in shown}) > 1
+    return spared if mixed and not any("e+" in text for text in spared) else shown
+
+
 def by_chance(p_value: float) -> str:
     """A p value in words: in how many records chance alone would do as much."""
     if p_value < RARE:

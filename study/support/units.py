@@ -107,8 +107,8 @@ def _written(plain: str) -> str:
 
 def _unknown(text: str) -> StudyError:
     known = (
-        f"N, kN and mm, in all {', '.join(BASES)} are known, {', '.join(PREFIXED)} with {', '.join(PREFIXES)} before "
-        "them, and products and powers such as mm/s^2"
+        f"N, kN, mm and cm, in all {', '.join(BASES)} are known, {', '.join(PREFIXED)} with {', '.join(PREFIXES)} "
+        "before them, and products and powers such as mm/s^2"
     )
     return StudyError(f"there is no unit {excerpt(text, 40)!r}; {known}")
 

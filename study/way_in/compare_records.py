@@ -26,6 +26,7 @@ from study.records.record import FORCE, Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 from study.records.sampling_rate import low_passed
 from study.support.errors import StudyError, expect
+from study.support.numbers import enumerated
 
 ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
 
@@ -70,10 +71,18 @@ def made_ready(
     prepared = laid_out(records, layout, KindOfTest(model.prescribed, drifts, model.modal is not None, anew, varies))
     model = with_laid_variations(model, prepared)
     lacks = _unseen(model, prepared)
-    noticed = [f"{r.name}: {remark}" if len(records) > 1 else remark for r in records for remark in r.remarks
-               if not (layout.use and LEAVING_OUT in remark)]  # fmt: skip
+    noticed = [remark for remark in _remarked(records) if not (layout.use and LEAVING_OUT in remark)]
     prepared = replace(prepared, near=layout.near or 0.0, notes=(*said, *noticed, *prepared.notes, *lacks))
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
+
+
+def _remarked(records: Sequence[Record]) -> list[str]:
+    """What was noticed of the records: of all of them once, else with the names of those that it is said of."""
+    of: dict[str, list[str]] = {}
+    for record in records:
+        for remark in record.remarks:
+            of.setdefault(remark, []).append(record.name)
+    return [said if len(names) == len(records) else f"in {enumerated(names)}: {said}" for said, names in of.items()]
 
 
 def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:

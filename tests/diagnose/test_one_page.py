@@ -31,6 +31,8 @@ def test_the_page_says_what_is_missing_before_and_after(content):
     assert content.after.prediction.error < content.before.prediction.error
     assert [row[0] for row in content.coefficients] == ["m", "c", "k", "c2"]
     assert "were tried" in content.says[1]
+    assert "is missing" in content.says[0]
+    assert "interval" not in content.says[0]  # the table has the one of the finished fit, and no second one is shown
 
 
 def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
@@ -43,6 +45,14 @@ def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
     assert "http" not in text.replace("http://www.w3.org", "")
     monkeypatch.setattr(one_page_files._Sheet, "most", 3)
     assert one_page_files._first(content.coefficients)[-1][0] == "and 2 more"
+
+
+def test_of_records_with_the_same_times_the_one_that_is_shown_is_drawn():
+    time, wave = np.tile(np.arange(0.0, 3.0, 0.1), 3), np.arange(90.0) % 31.0
+    shown = slice(34, 40)
+    same = one_page_files.same_motion(time, wave, time[shown], wave[shown])
+    np.testing.assert_array_equal(same, np.arange(34, 40))
+    assert len(one_page_files.same_motion(time, wave, np.array([7.0]), np.array([0.0]))) == 0
 
 
 def test_lines_are_no_wider_than_the_sheet():

@@ -9,11 +9,12 @@ from study.compare.comparison import compare
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
+from study.identify.frequency_domain.starting_values import coherent_lines
 from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import settling, shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
-from study.identify.time_domain.no_response import LINEAR
+from study.identify.time_domain.no_response import LINEAR, driven_at
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.stretch_states import is_poor
@@ -199,6 +200,17 @@ def test_a_steady_sine_does_not_tell_the_mass(noise):
     with pytest.raises(StudyError, match=r"drives one frequency, 1\.91 Hz, which cannot tell mass from stiffness"):
         fit_model(model, prepared)
     assert fit_model(model.with_values({"m": 1.0}), prepared).model.values["k"] == pytest.approx(239.6, rel=0.01)
+
+
+def test_a_wide_band_in_a_short_record_is_not_taken_for_one_frequency():
+    """Its usual segments have four lines, as few as a window makes of a sine; longer ones have more."""
+    model, sine = driven_by_a_sine(0.01)
+    true = model.with_values({"m": 1.0, "c": 0.8, "k": 800.0})
+    record = simulate(true, force(Excitation(level=1.0, cutoff=4.0), 2000, 0.01, 1), 0.01, Integrator("rk4", 4))
+    short = prepare_record(Record(0.01, {name: record[name] for name in ("force", "displacement")}))
+    assert len(coherent_lines(short).omega) == 4
+    assert driven_at(model, short) == 0.0
+    assert driven_at(model, prepare_record(sine)) == pytest.approx(12.0, rel=0.01)
 
 
 def test_noise_is_no_decay():

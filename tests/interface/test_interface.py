@@ -418,6 +418,8 @@ def test_of_two_modes_the_one_that_is_meant_is_fitted():
     single = st.Model("inertia", "linear_damping", "linear_stiffness", name="one")
     meant = single.fit(record, measurement=False, near=7.0, up_to=15.0)
     assert meant.f_n.value == pytest.approx(first, rel=0.02)
+    ended = f"the fit began at the mode near 7 Hz (--near) and ended at {meant.f_n.value:.4g} Hz"
+    assert ended in meant.comparison.notes
     assert meant.error < 0.2 < single.fit(record, measurement=False).error
     with pytest.raises(st.StudyError, match="too little in common near 500 Hz"):
         single.fit(record, measurement=False, near=500.0)

@@ -11,6 +11,7 @@ import pytest
 import pyuff
 from scipy.io import savemat
 
+import study as st
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Record
 from study.support.errors import StudyError
@@ -193,6 +194,24 @@ def test_each_cell_of_matlab_is_a_record(tmp_path: Path) -> None:
         record = read_record(path, ReadOptions(columns, group="runs/2"))
         assert record.name == f"{path.stem}_runs_2"
         np.testing.assert_array_equal(record["force"], 2.0 * FORCE)
+
+
+def test_cells_of_each_channel_are_chosen_by_their_number_and_share_the_rate_beside_them(tmp_path: Path) -> None:
+    force, displacement = np.empty(2, dtype=object), np.empty(2, dtype=object)
+    for place, k in enumerate((1.0, 2.0)):
+        force[place], displacement[place] = k * FORCE, k * DISPLACEMENT
+    savemat(tmp_path / "rig.mat", {"force": force, "displacement": displacement, "fs": 50.0})
+    with pytest.raises(StudyError, match="choose --group 1 or 2"):
+        read_record(tmp_path / "rig.mat")
+    with pytest.raises(StudyError, match="holds 1, 2, displacement/1, displacement/2, force/1, force/2; expected"):
+        read_record(tmp_path / "rig.mat", ReadOptions(group="3"))
+    record = read_record(tmp_path / "rig.mat", ReadOptions(group="2"))
+    np.testing.assert_array_equal(record["force"], 2.0 * FORCE)
+    np.testing.assert_array_equal(record["displacement"], 2.0 * DISPLACEMENT)
+    assert (record.name, record.dt) == ("rig_2", 0.02)
+    (tmp_path / "rig.record.yaml").write_text("group: 2\n")
+    for again in (st.read(tmp_path / "rig.mat"), st.read(tmp_path / "rig.mat", group=2)):
+        np.testing.assert_array_equal(again["force"], record["force"])
 
 
 def test_each_cell_of_matlab_7_3_is_a_record(tmp_path: Path) -> None:

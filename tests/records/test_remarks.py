@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.equations.model_file import parse_model
 from study.records.readers import ReadOptions, read_record
 from study.records.record_layout import Layout, laid_out
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 
 RATE, SAMPLES = 200.0, 4096
 
@@ -34,6 +36,17 @@ def test_a_good_record_is_left_without_a_word(tmp_path: Path) -> None:
 def test_units_that_nobody_gave_are_said(tmp_path: Path) -> None:
     (said,) = read_record(written(tmp_path / "rig.csv", shaken(), "force [N],displacement")).remarks
     assert said == "displacement has no unit and is taken in m (--unit displacement=UNIT says otherwise)"
+
+
+def test_what_holds_of_all_records_is_said_once_and_else_with_their_names(tmp_path: Path) -> None:
+    heads = {"low": "force [N],displacement", "mid": "force [N],displacement", "high": "force,displacement"}
+    records = [read_record(written(tmp_path / f"{name}.csv", shaken(), head)) for name, head in heads.items()]
+    model = parse_model("name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n", Path("rig.yaml"))
+    bare = "displacement has no unit and is taken in m (--unit displacement=UNIT says otherwise)"
+    assert bare in made_ready(records[:2], model, Layout())[1].notes
+    notes = made_ready(records, model, Layout())[1].notes
+    assert f"in low and mid: {bare}" in notes
+    assert any(note.startswith("in high: force and displacement have no unit") for note in notes)
 
 
 def test_a_force_of_the_wrong_sign_is_doubted_and_a_scale_turns_it_round(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def test_units(text: str, written: str, factor: float) -> None:
     "text", ["", "x", "banana", "m/", "m^^2", "m/0", "N" * 999, "^", "m^99", "%", "m/s^", "furlong"]
 )
 def test_nonsense_units(text: str) -> None:
-    with pytest.raises(StudyError, match="there is no unit"):
+    with pytest.raises(StudyError, match=r"there is no unit .* N, kN, mm and cm, .* kgf, .* inch, .* deg, "):
         parse_unit(text)
 
 

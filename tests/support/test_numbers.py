@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.support.numbers import by_chance
+from study.support.numbers import by_chance, in_one_notation
 
 
 @pytest.mark.parametrize(
@@ -11,3 +11,16 @@ from study.support.numbers import by_chance
 )
 def test_a_p_value_is_said_as_a_number_of_records(p_value: float, records: str) -> None:
     assert by_chance(p_value) == f"chance alone would do as much in {records} records"
+
+
+@pytest.mark.parametrize(
+    ("values", "shown"),
+    [
+        ((99962.0, 99803.0, 100121.0), ["99962", "99803", "100120"]),
+        ((43531.0, 35312.0, 51748.0), ["43531", "35312", "51748"]),
+        ((2e7, 1.999e7, 2.001e7), ["2e+07", "1.999e+07", "2.001e+07"]),
+        ((1e6, -12.0, 2e6), ["1e+06", "-12", "2e+06"]),
+    ],
+)
+def test_the_ends_of_an_interval_are_written_alike(values: tuple[float, ...], shown: list[str]) -> None:
+    assert in_one_notation(values, 5) == shown

@@ -69,6 +69,9 @@ def coherent_lines(prepared: Prepared) -> LinearApproximation:
         beside = f"force and {response} of {record.name!r} have too little in common near {prepared.near:g} Hz"
         expect(len(found.omega) >= FEWEST_LINES, f"{beside}; expected the frequency of a mode that the record shows")
         return found
+    if len(found.omega) >= FEWEST_LINES and found.single:  # as few as short segments have of a wide band, too
+        longer, _ = _lines(part, response, min(2 * length, len(part) // 2))
+        return replace(found, neighbours=max(found.neighbours, longer.neighbours))
     if len(found.omega) >= FEWEST_LINES:
         return found
     while len(part) >= LONG_ENOUGH and length < len(part) // 2:

@@ -108,7 +108,7 @@ def read_options(path: Path) -> ReadOptions:
             units={role: _text(f"the unit of {role}", unit) for role, unit in _mapping(given, "units").items()},
             dt=_number("dt", given.get("dt")),
             fs=_number("fs", given.get("fs")),
-            group=None if given.get("group") is None else _text("group", given["group"]),
+            group=_group(given.get("group")),
             samples=_samples(given.get("samples")),
             period=_whole("period", given.get("period")),
             measurement=_measurement(given),
@@ -160,6 +160,11 @@ def _text(name: str, value: object) -> str:
     if not isinstance(value, str) or not value.strip():
         raise _wrong(name, value, "a name")
     return value.strip()
+
+
+def _group(value: object) -> str | None:
+    """A name, or the number of a cell."""
+    return str(value) if type(value) is int else None if value is None else _text("group", value)
 
 
 def _number(name: str, value: object) -> float | None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from study.records.driven_by_motion import BASE
 from study.records.readers.options import OPTIONS_SUFFIX, ReadOptions
-from study.records.readers.table import Column, Table
+from study.records.readers.table import Column, Table, groups_in
 from study.records.record import ALONE, MOTIONS, Sensor
 from study.support.errors import StudyError, expect
 from study.support.units import ROLES, parse_unit
@@ -225,7 +225,7 @@ def _ask(path: Path, table: Table, roles: Roles, problem: str) -> StudyError:
     """The one sentence that shows the columns and the option to give."""
     if not table.columns:
         return StudyError(f"{path}: {problem}, since the file holds no column of numbers; expected force and motion")
-    groups = sorted({c.name.rsplit("/", 1)[0] for c in table.columns if "/" in c.name})
+    groups = groups_in(column.name for column in table.columns)
     choose = f" and choose --group {groups[0]} or {groups[1]}" if len(groups) > 1 else ""
     wanted = " ".join(f"--column {channel}=NAME" for channel in (*roles.forces[:1], _motion_of(roles)))
     return StudyError(

@@ -1,6 +1,7 @@
 """What every kind of file is read into: named columns, and what the file itself says about them."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -73,16 +74,41 @@ def split_unit(text: str) -> tuple[str, str]:
 
 
 def in_group(path: Path, names: Iterable[str], group: str | None, kind: str) -> list[str]:
-    """Those of some paths within a file that lie in the group that the user named, if any."""
+    """Those of some paths within a file that lie in the group that the user named, if any.
+
+    A rate that stands beside the groups holds for each of them that states none.
+    """
     names = list(names)
     if group is None:
         return names
     chosen = [name for name in names if name.startswith(group.strip("/") + "/")]
-    groups = sorted({name.rsplit("/", 1)[0] for name in names if "/" in name})
-    expect(
-        chosen, f"{path}: there is no {kind} {group!r}; it holds {', '.join(groups) or 'none'}; expected one of these"
-    )
-    return chosen
+    chosen = chosen or [name for name in names if _cell(name) == group]
+    known = ", ".join(groups_in(names)) or "none"
+    expect(chosen, f"{path}: there is no {kind} {group!r}; it holds {known}; expected one of these")
+    rates = [name for name in names if "/" not in name and _states_rate(name)]
+    return chosen if any(_states_rate(name) for name in chosen) else chosen + rates
+
+
+def groups_in(names: Iterable[str]) -> list[str]:
+    """What ``--group`` may choose: folders, structures and cells, or the number of a cell that every channel has."""
+    names = list(names)
+    cells = Counter(number for name in names if (number := _cell(name)))
+    shared = [number for number, channels in cells.items() if channels > 1]
+    return shared + sorted({name.rpartition("/")[0] for name in names if "/" in name})
+
+
+def _cell(name: str) -> str:
+    """The number of a cell whose array has no name but that of all cells: 2 of ``force/2/force``."""
+    *_, array, number, channel = ("", "", *name.split("/"))
+    return number if array == channel and number.isdigit() else ""
+
+
+def _states_rate(name: str) -> bool:
+    return _stem(name) in (*RATES, *INTERVALS)
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
 
 
 def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
@@ -92,13 +118,12 @@ def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, st
     columns: list[Column] = []
     intervals: set[float] = set()
     for name, array in named.items():
-        stem = re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
-        if array.size == 1 and stem in (*RATES, *INTERVALS):
+        if array.size == 1 and _states_rate(name):
             value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
             if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
                 shown = str(array.reshape(-1)[0])
                 raise StudyError(f"{path}: {name!r} is {shown}; expected a sampling rate or interval above zero")
-            intervals.add(1.0 / value.real if stem in RATES else value.real)
+            intervals.add(1.0 / value.real if _stem(name) in RATES else value.real)
         elif series == [name] and array.ndim == 2 and min(array.shape) > 1:  # a file's only matrix, channels in columns
             tall = array if array.shape[0] >= array.shape[1] else array.T
             columns += [_column(f"{name}:{k}", tall[:, k - 1], "") for k in range(1, tall.shape[1] + 1)]
