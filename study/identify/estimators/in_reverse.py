@@ -54,7 +54,7 @@ def local_polynomial(model: Model, record: Record, settings: Settings) -> Identi
 def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> Identified:
     """The same for the transforms of any inputs and, last, of what they make up."""
     estimate, _ = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
-    responses = local_polynomial_responses(lines, settings.local_polynomial)
+    responses = local_polynomial_responses(lines, settings.local_polynomial) if settings.curves else None
     return Identified(inputs, responses, named_parameters(estimate), estimate)
 
 

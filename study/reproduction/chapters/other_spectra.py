@@ -122,7 +122,7 @@ def _estimates(
         absolute=study.tolerances.absolute,
     )  # fmt: skip
     for estimator in used:
-        settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]))
+        settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]), curves=False)
         if estimator == DRIVEN_LINES:
             settings = replace(settings, band=_driven_band(record, settings, own.driven))
         try:
