@@ -46,6 +46,9 @@ static double result_of(int64_t op, double a, double b) {
  * Each operation jumps to the next one itself: a processor foresees that better than the one jump of a switch. Returns
  * where each is written out, by its number; without instructions it does nothing else.
  */
+#if !defined(__clang__)
+__attribute__((optimize("no-crossjumping"))) /* gcc would merge these jumps again */
+#endif
 static const Operation *run_from(const Instruction *i) {
 #define LABELS(number, result) &&from_memory_##number, &&first_##number, &&second_##number, &&both_##number,
     static const Operation OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
