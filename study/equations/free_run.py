@@ -264,7 +264,7 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
         return _along_stretches(record, span, driving, factor)
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
-    columns = [_between(record[name].tobytes(), factor, record.reading(name))[part] for name in driving]
+    columns = [_between(record[name], factor, record.reading(name))[part] for name in driving]
     drive = _side_by_side(columns) if columns else np.zeros((factor * (last - first), 0))
     return drive, ((0, record.start + first * record.dt),), None
 
@@ -279,7 +279,7 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
         for run in runs:
             starts.append((begin, float(run.source.time[run.first])))
             begin += len(run)
-        columns = [between_runs(part, name, factor) for name in driving]
+        columns = [between_runs(part, name, factor, _kept) for name in driving]
         drive = _side_by_side(columns) if columns else np.zeros((factor * begin, 0))
         drive.flags.writeable = False
         return drive, tuple(starts), places
@@ -294,19 +294,22 @@ def _side_by_side(columns: Sequence[Floats]) -> Floats:
     return columns[0][:, None] if len(columns) == 1 else np.column_stack(columns)
 
 
-def _between(values: bytes, factor: int, reading: str) -> Floats:
-    """A channel between its samples; a diagnosis makes hundreds of runs under the same force.
+def _between(values: Floats, factor: int, reading: str) -> Floats:
+    """A channel between its samples; threads wait for each other: two fits of one record ask for the same."""
+    with _ONE_AT_A_TIME:
+        return _kept(values, factor, reading)
 
-    Threads wait for each other: two fits of one record ask for the same.
-    """
+
+def _kept(values: Floats, factor: int, reading: str) -> Floats:
+    """The same for whoever has waited; a diagnosis makes hundreds of runs under the same force."""
+    own = values.tobytes()
 
     def made() -> Floats:
-        fine = between_samples(np.frombuffer(values), factor, reading)
+        fine = between_samples(np.frombuffer(own), factor, reading)
         fine.flags.writeable = False
         return fine
 
-    with _ONE_AT_A_TIME:
-        return _FORCES.get((values, factor, reading), len(values) * (1 + factor), made)
+    return _FORCES.get((own, factor, reading), len(own) * (1 + factor), made)
 
 
 _FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(), Recent(), Lock()

@@ -54,14 +54,15 @@ def identify_spectra(inputs: Sequence[Input], result: MisoResult, settings: Sett
 def local_polynomial(model: Model, record: Record, settings: Settings) -> Identified:
     """One transform of the whole record, no window, no leakage of its ends: A_j(f) in narrow bands."""
     inputs = reverse_inputs(model)
-    return identify_lines(inputs, transform([*histories(inputs, record), record["force"]], record.dt), settings)
+    lines = transform([*histories(inputs, record), record["force"]], record.dt)
+    return identify_lines(inputs, lines, settings)[0]
 
 
-def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> Identified:
-    """The same for the transforms of any inputs and, last, of what they make up."""
-    estimate, _ = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
+def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> tuple[Identified, Floats]:
+    """The same for the transforms of any inputs and, last, of what they make up; and the fit's shifts."""
+    estimate, shifts = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
     responses = local_polynomial_responses(lines, settings.local_polynomial) if settings.curves else None
-    return Identified(inputs, responses, named_parameters(estimate), estimate)
+    return Identified(inputs, responses, named_parameters(estimate), estimate), shifts
 
 
 def errors_in_variables(model: Model, record: Record, settings: Settings) -> Identified:
