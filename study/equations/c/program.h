@@ -34,9 +34,8 @@ typedef struct {
 /*
  * `count` instructions of three numbers each (operation, operands), the first of which writes register `first`, made
  * ready for many runs: what depends on nothing that changes is computed now and left out of the code. Registers below
- * `changing` change from run to run, and those in `others`. What nothing `needed` is computed from, a flag a register, is
- * left out too; 0 where all are. Instructions from `split` on are the `rest`, which runs by itself. Returns 0 where there
- * is no memory.
+ * `changing` change from run to run, and those in `others`. Left out too is what is not `needed`, a flag a register; 0
+ * where all are. Instructions from `split` on are the `rest`, which runs by itself. Returns 0 where there is no memory.
  */
 int prepare_program(
     Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
