@@ -10,11 +10,14 @@ from pydantic import BeforeValidator
 from study.commands.measurements import Measurement
 from study.commands.parser import parser
 from study.commands.record_arguments import layout_of, read_records
-from study.compare.comparison import Comparison, compare
+from study.compare.comparison import compared_fit
+from study.compare.prediction import predict
 from study.equations.model import free
 from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.faults.fault import FAULTS, settings_of
+from study.identify.time_domain.fit_model import fit_model
+from study.records.prepared import Prepared
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
 from study.way_in.compare_records import compare_records
@@ -62,7 +65,7 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
     layout = layout_of(arguments, records[0])
     settings = settings_of({name: None for name in FAULTS if name not in ladder.faults})
-    found: Comparison | None = None
+    prepared: Prepared | None = None
     for step in range(len(ladder.terms) + 1):
         if step:
             model = model.with_term(free(get(ladder.terms[step - 1])))
@@ -71,17 +74,18 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             "added": ladder.terms[step - 1] if step else "", "published": ladder.published,
         }  # fmt: skip
         try:
-            found = (
-                compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
-                if found is None else compare(model, found.prepared)
-            )  # fmt: skip
+            if prepared is None:
+                first = compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
+                prepared, prediction = first.prepared, first.prediction
+            else:
+                prediction = predict(compared_fit(fit_model(model, prepared), prepared)[0], prepared)
         except StudyError as error:
             rows.append({**about, "note": str(error)})
             continue
-        worst = found.worst
+        worst = prediction.worst
         rows.append({
             **about, "error": worst.error, "rms": worst.error * worst.size,
-            "unit": found.record.units.get(str(worst.sensor), ""), "floor": found.prediction.floor, "note": "",
+            "unit": prepared.record.units.get(str(worst.sensor), ""), "floor": prediction.floor, "note": "",
         })  # fmt: skip
     return pd.DataFrame(rows, columns=LADDER_COLUMNS)
 

@@ -97,7 +97,7 @@ class Comparison:
     @property
     def worst(self) -> SensorPrediction:
         """What the sensor shows that is missed most."""
-        return self.views[int(np.argmax(self.prediction.errors))]
+        return self.prediction.worst
 
     @cached_property
     def coefficients(self) -> tuple[Coefficient, ...]:
@@ -181,8 +181,7 @@ def compare(
     if estimator != FREE_RUN:
         fit, known = fit_by(estimator, model, prepared)
     if fit is None:
-        fit, *alike = best_first(search or fit_model(model, prepared, start), prepared)
-        fit = smoothed(weighted(dated(fit, prepared), prepared), prepared)
+        fit, alike = compared_fit(search or fit_model(model, prepared, start), prepared)
     else:
         alike = rivals(fit, prepared)
     report("free run")
@@ -208,6 +207,12 @@ def _ended_at(fit: FreeRunFit, prepared: Prepared) -> str:
         return ""
     ended = math.sqrt(k / m) / (2.0 * math.pi)
     return f"the fit began at the mode near {prepared.near:g} Hz (--near) and ended at {ended:.4g} Hz"
+
+
+def compared_fit(search: FreeRunFit, prepared: Prepared) -> tuple[FreeRunFit, list[FreeRunFit]]:
+    """The finished fit from what ``fit_model`` gave, and its rivals."""
+    fit, *alike = best_first(search, prepared)
+    return smoothed(weighted(dated(fit, prepared), prepared), prepared), alike
 
 
 def _why_in_segments(fit: FreeRunFit, prepared: Prepared) -> str:
@@ -245,7 +250,7 @@ def _judged(
         "prediction": prediction, "forces": forces, "bands": bands(views, forces), "missing": missing,
         "missing_force": lacking, "place": place,
         "growths": None if all(v.noise.alone for v in views) else growths(lacking),
-        "time": along_time(views[int(np.argmax(prediction.errors))]),
+        "time": along_time(prediction.worst),
     }  # fmt: skip
 
 

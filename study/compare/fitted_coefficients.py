@@ -13,7 +13,7 @@ from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.identify.time_domain.part_fit import run_and_slopes, uncertainty
 from study.identify.time_domain.rivals import larger
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -65,7 +65,7 @@ def found_by(fit: FreeRunFit, prepared: Prepared) -> Estimate:
     if not fit.keys or fit.restarts:
         return fit.estimate
     count = len(fit.keys)
-    return Estimate(fit.keys, fit.values, uncertainty(fit, prepared, linearise(fit, prepared))[:count, :count])
+    return Estimate(fit.keys, fit.values, uncertainty(fit, prepared, *run_and_slopes(fit, prepared))[:count, :count])
 
 
 def coefficients(model: Model, found: Estimate, record: Record) -> tuple[Coefficient, ...]:

@@ -83,6 +83,11 @@ class Prediction:
         return np.array([view.error for view in self.views])
 
     @property
+    def worst(self) -> "SensorPrediction":
+        """What the sensor shows that is missed most."""
+        return self.views[int(np.argmax(self.errors))]
+
+    @property
     def error(self) -> float:
         """Root mean square of the sensors' errors."""
         return _rms(self.errors)

@@ -14,7 +14,7 @@ from study.diagnose.held_out import HeldOut, held_out
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.model import ModelTerm
 from study.identify.time_domain.motion_range import motion_range
-from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.identify.time_domain.part_fit import run_and_slopes, uncertainty
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.statistics import Gain
@@ -111,8 +111,8 @@ class Ranked(FittedCandidate):
 def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     """A candidate with its coefficients' errors and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
-    jacobian = linearise(fit, prepared)
-    covariance = uncertainty(fit, prepared, jacobian)
+    coarse, jacobian = run_and_slopes(fit, prepared)
+    covariance = uncertainty(fit, prepared, coarse, jacobian)
     reach = motion_range(fit, prepared)
 
     def effect(entry: ModelTerm) -> FittedEffect:

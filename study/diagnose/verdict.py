@@ -27,7 +27,7 @@ from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion, seen_everywhere
-from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.part_fit import fit_part, run_and_slopes, uncertainty
 from study.identify.time_domain.promised_changes import PromisedChanges, promised_changes
 from study.identify.time_domain.shape_search import Baseline
 from study.identify.time_domain.weighted_fit import finished
@@ -91,7 +91,7 @@ class Diagnosis:
         if self.answer is None:
             return self.comparison.varying
         fit, prepared, count = self.answer.fit, self.comparison.prepared, len(self.answer.fit.keys)
-        covariance = uncertainty(fit, prepared, linearise(fit, prepared))
+        covariance = uncertainty(fit, prepared, *run_and_slopes(fit, prepared))
         return varying_coefficients(fit, covariance[:count, :count], prepared)
 
     @cached_property
@@ -100,7 +100,7 @@ class Diagnosis:
         if self.answer is None:
             return None
         fit, prepared = self.answer.fit, self.comparison.prepared
-        covariance = uncertainty(fit, prepared, linearise(fit, prepared))
+        covariance = uncertainty(fit, prepared, *run_and_slopes(fit, prepared))
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 

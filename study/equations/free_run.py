@@ -122,6 +122,20 @@ class FreeRun:
         arrivals : array, shape (cuts, states, 1 + keys + free_states)
             State in which each segment but the last arrives where the next begins, beside its derivatives.
         """
+        out, arrivals = self._columns(values, initial, 1 + len(self.keys) + free_states)
+        return out[:, :, 0], out[:, :, 1:], arrivals
+
+    def move_by_segment(
+        self, values: Mapping[str, float], initial: Sequence[float] | Floats
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """Response and arrivals of :meth:`respond_by_segment`, to the last bit, without derivatives: (cuts, states)."""
+        out, arrivals = self._columns(values, initial, 1)
+        return out[:, :, 0], arrivals[:, :, 0]
+
+    def _columns(
+        self, values: Mapping[str, float], initial: Sequence[float] | Floats, columns: int
+    ) -> tuple[Floats, Floats]:
+        """What is observed and the arrivals, in so many columns: the value, derivatives by keys, by initial states."""
         bounds = (0, *self.cuts, self.samples)
         states = np.atleast_2d(initial)
         if np.ndim(initial) == 1 and states.size == self.states * (len(bounds) - 1):
@@ -131,10 +145,10 @@ class FreeRun:
         program = self.motion.program.with_inputs({key: values[key] for key in self.keys})
         motion = replace(self.motion, program=program)
         first_free = 1 + len(self.keys)
-        out = np.empty((self.length, len(motion.observed), first_free + free_states))
-        state = np.zeros((len(states), self.states, out.shape[2]))  # one array for all segments is faster
+        out = np.empty((self.length, len(motion.observed), columns))
+        state = np.zeros((len(states), self.states, columns))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
-        state[:, range(free_states), range(first_free, out.shape[2])] = 1.0
+        state[:, range(columns - first_free), range(first_free, columns)] = 1.0
         if len(states) == 1 or self.samples * self.steps < SHARED:
             self._integrate(motion, bounds, state, out)
         else:
@@ -145,7 +159,7 @@ class FreeRun:
                 other.result()
         if self.places is not None:
             out = out[self.places]
-        return out[:, :, 0], out[:, :, 1:], state[:-1]
+        return out, state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
         """State at the first sample of each segment, shape (cuts + 1, states), of a motion with fewer restarts.
@@ -250,7 +264,7 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
         return _along_stretches(record, span, driving, factor)
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
-    columns = [_between(record[name].tobytes(), factor, record.reading(name))[part] for name in driving]
+    columns = [_between(record[name], factor, record.reading(name))[part] for name in driving]
     drive = _side_by_side(columns) if columns else np.zeros((factor * (last - first), 0))
     return drive, ((0, record.start + first * record.dt),), None
 
@@ -265,7 +279,7 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
         for run in runs:
             starts.append((begin, float(run.source.time[run.first])))
             begin += len(run)
-        columns = [between_runs(part, name, factor) for name in driving]
+        columns = [between_runs(part, name, factor, _kept) for name in driving]
         drive = _side_by_side(columns) if columns else np.zeros((factor * begin, 0))
         drive.flags.writeable = False
         return drive, tuple(starts), places
@@ -280,19 +294,22 @@ def _side_by_side(columns: Sequence[Floats]) -> Floats:
     return columns[0][:, None] if len(columns) == 1 else np.column_stack(columns)
 
 
-def _between(values: bytes, factor: int, reading: str) -> Floats:
-    """A channel between its samples; a diagnosis makes hundreds of runs under the same force.
+def _between(values: Floats, factor: int, reading: str) -> Floats:
+    """A channel between its samples; threads wait for each other: two fits of one record ask for the same."""
+    with _ONE_AT_A_TIME:
+        return _kept(values, factor, reading)
 
-    Threads wait for each other: two fits of one record ask for the same.
-    """
+
+def _kept(values: Floats, factor: int, reading: str) -> Floats:
+    """The same for whoever has waited; a diagnosis makes hundreds of runs under the same force."""
+    own = values.tobytes()
 
     def made() -> Floats:
-        fine = between_samples(np.frombuffer(values), factor, reading)
+        fine = between_samples(np.frombuffer(own), factor, reading)
         fine.flags.writeable = False
         return fine
 
-    with _ONE_AT_A_TIME:
-        return _FORCES.get((values, factor, reading), len(values) * (1 + factor), made)
+    return _FORCES.get((own, factor, reading), len(own) * (1 + factor), made)
 
 
 _FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(), Recent(), Lock()

@@ -188,7 +188,7 @@ class Graph:
             case Op.MUL:
                 return self.add(self.mul(da, b), self.mul(a, db))
             case Op.DIV:
-                return self.div(self.sub(da, self.mul(node, db)), b)
+                return self._over(self.sub(da, self.mul(node, db)), b)
             case Op.MAX:
                 return self._choose(self.binary(Op.GT, a, b), da, db)
             case Op.MIN:
@@ -198,6 +198,13 @@ class Graph:
                 assert exponent is not None, "the parser admits constant exponents only"
                 slope = self.mul(self.const(exponent), self.power(a, exponent - 1.0))
                 return self.mul(slope, da)
+
+    def _over(self, a: int, b: int) -> int:
+        """a / b; a minus goes from a to b, the same to the last bit: slopes of an acceleration share that of a mass."""
+        op, positive, _ = self.nodes[a]
+        if op is Op.NEG and self.constant_value(b) is None:
+            return self.div(positive, self.neg(b))
+        return self.div(a, b)
 
     def _choose(self, gate: int, yes: int, no: int) -> int:
         if yes == no:

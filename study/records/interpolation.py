@@ -5,6 +5,8 @@ an integrator with several steps a sample would respond to. Band-limited interpo
 content above its Nyquist frequency.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.fft import irfft, rfft
 
@@ -79,11 +81,14 @@ def runs_of(record: Record) -> tuple[tuple[Stretch, ...], Ints]:
     return tuple(runs), np.concatenate(places)
 
 
-def between_runs(record: Record, name: str, factor: int) -> Floats:
+def between_runs(
+    record: Record, name: str, factor: int, between: Callable[[Floats, int, str], Floats] = between_samples
+) -> Floats:  # fmt: skip
     """A channel along the motions of a record that is strung together, on a grid ``factor`` times as fine.
 
     Each as its source has it, so that no joint is seen; between two motions the last value holds. A channel that the
-    record has of its own (``changed``) is taken as straight where a motion runs on between two stretches.
+    record has of its own (``changed``) is taken as straight where a motion runs on between two stretches. ``between``
+    is :func:`between_samples`, or what keeps its results.
     """
     parts: list[Floats] = []
     runs, places = runs_of(record)
@@ -91,7 +96,7 @@ def between_runs(record: Record, name: str, factor: int) -> Floats:
     for run in runs:
         inside = (places >= begin) & (places < begin + len(run))
         along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None
-        fine = between_samples(run.source[name] if along is None else along, factor, record.reading(name))
+        fine = between(run.source[name] if along is None else along, factor, record.reading(name))
         fine = fine[0 if own else factor * run.first :][: factor * len(run)]
         parts.append(np.pad(fine, (0, factor * len(run) - len(fine)), mode="edge"))
         begin += len(run)

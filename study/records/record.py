@@ -4,6 +4,7 @@ import csv
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path
 
@@ -144,13 +145,13 @@ class Record:
             return np.concatenate([stretch.time for stretch in self.stretches])
         return self.start + self.dt * np.arange(len(self), dtype=np.float64)
 
-    @property
+    @cached_property
     def begins(self) -> tuple[int, ...]:
         """Samples at which the motion begins anew, the first aside."""
         pairs = zip(self.joints, self.stretches[1:], strict=True)
         return tuple(joint for joint, stretch in pairs if not stretch.continues)
 
-    @property
+    @cached_property
     def joints(self) -> tuple[int, ...]:
         """Samples at which its stretches begin, the first aside."""
         return tuple(accumulate(len(stretch) for stretch in self.stretches[:-1]))

@@ -224,11 +224,16 @@ def point_at(
     with np.errstate(over="ignore", invalid="ignore"):  # what is out of range is refused below
         scale, normal = normal_equations(residual, jacobian, shared, begins, continuity)
         if continuity is not None:
-            residual = np.concatenate([residual, -continuity.gaps.ravel()])
+            residual = with_gaps(residual, continuity.gaps)
         cost = float(residual @ residual)
     if not (np.isfinite(cost) and np.all(np.isfinite(scale)) and np.all(np.isfinite(normal.shared))):
         return None
     return Point(x, residual, cost, scale, normal)
+
+
+def with_gaps(residual: Floats, gaps: Floats) -> Floats:
+    """A residual and, behind it, weighted gaps between segments."""
+    return np.concatenate([residual, -gaps.ravel()])
 
 
 @dataclass(frozen=True)
@@ -242,12 +247,9 @@ class End:
 
 
 def minimise(
-    linearise: Callable[[Floats], Point | None],
-    point: Point,
-    size: float,
-    max_iterations: int,
-    offset: float = RELATIVE_OFFSET,
-) -> End:
+    linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int,
+    offset: float = RELATIVE_OFFSET, cost: Callable[[Floats], float] | None = None,
+) -> End:  # fmt: skip
     """Search from a point with Nielsen's damping.
 
     Parameters
@@ -262,13 +264,17 @@ def minimise(
         Trials after which to give up.
     offset : float
         Length of the next step, in standard errors, at which the search has converged.
+    cost : callable, optional
+        Sum of squares of the residual alone at given variables, infinite where there is none, which takes less than its
+        derivatives: where a step was rejected the next one mostly is, and it is asked first.
     """
     count = len(point.x)
     freedom = max(len(point.residual) - count, 1)
-    damping, growth, costs = 1e-3, 2.0, list[float]()
+    damping, growth, costs, fall = 1e-3, 2.0, list[float](), np.inf
     for iteration in range(1, max_iterations + 1):
         unit = count * point.cost / freedom  # fall of the error in a step of one standard error
-        fall = point.normal.decrement()
+        if growth == 2.0:  # else the step before was rejected, and the point is the same
+            fall = point.normal.decrement()
         found = f"converged after {iteration} free runs"
         if fall <= offset**2 * unit or fall <= (ROUNDING * size) ** 2:
             return End(point, True, iteration, found)
@@ -280,8 +286,10 @@ def minimise(
             why = f"no step lowers the error, though one of {left:.2g} standard errors should"
             return End(point, False, iteration, f"stuck after {iteration} free runs: {why}")
         step = point.normal.step(damping)
-        trial = linearise(point.x + step / point.scale)
+        x = point.x + step / point.scale
         expected = float(step @ (damping * step + point.normal.gradient()))
+        hopeful = cost is None or growth == 2.0 or (point.cost - cost(x)) / expected > 0.0
+        trial = linearise(x) if hopeful else None
         gain = -1.0 if trial is None else (point.cost - trial.cost) / expected
         if trial is not None and gain > 0.0:
             point = trial

@@ -334,6 +334,27 @@ static int prepare_room(Motion *m) {
     return 1;
 }
 
+/*
+ * Which registers are read, and what they are computed from: rows, their derivatives where there are columns for these,
+ * and what friction needs. The caller frees the flags; 0 where there is no memory.
+ */
+static char *find_needed(
+    const Motion *m, const int64_t *code, int64_t count, int64_t first, const int64_t *slots, int64_t slot_width
+) {
+    const Friction *f = &m->friction;
+    char *needed = calloc((size_t)(first + count + 1), 1);
+    int64_t read = m->columns == 1 ? 1 : slot_width;
+    if (!needed) return 0;
+    for (int64_t row = 0; row < m->rows; row++)
+        for (int64_t i = 0; i < read; i++) needed[slots[row * slot_width + i]] = 1;
+    for (int64_t i = 0; i < f->places * m->rows; i++) needed[f->by_side[i]] = 1;
+    for (int64_t i = 0; i < 3 * f->places; i++)
+        if (f->shifts[i] >= 0) needed[f->shifts[i]] = 1;
+    for (int64_t i = count - 1; i >= 0; i--)
+        if (needed[first + i]) needed[code[3 * i + 1]] = needed[code[3 * i + 2]] = 1;
+    return needed;
+}
+
 int prepare_motion(
     Motion *m, const int64_t *code, int64_t count, int64_t split, int64_t inputs, int64_t first, double *r,
     const int64_t *slots, int64_t slot_width
@@ -341,7 +362,11 @@ int prepare_motion(
     const Friction *f = &m->friction;
     int64_t changing = 1 + m->drives + m->states;
     if (!prepare_room(m)) return 0;
-    if (!prepare_program(&m->program, code, count, split, first, r, changing, f->sides, f->places)) return 0;
+    char *needed = find_needed(m, code, count, first, slots, slot_width);
+    if (!needed) return 0;
+    int ready = prepare_program(&m->program, code, count, split, first, r, changing, f->sides, f->places, needed);
+    free(needed);
+    if (!ready) return 0;
     find_derivatives(m, slots, slot_width, inputs, first);
     return 1;
 }

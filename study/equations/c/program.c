@@ -38,16 +38,23 @@ static double result_of(int64_t op, double a, double b) {
 
 /*
  * An operand that the instruction before has computed is taken from the processor, not from the memory, where it takes
- * as long to come back as two additions: `op` of an instruction is 4 times that of graph.Op, plus 1 if its first operand
- * is such a one, and 2 if the second is.
+ * as long to come back as two additions: the number of an operation is 4 times that of graph.Op, plus 1 if its first
+ * operand is such a one, and 2 if the second is.
  */
 #if defined(__GNUC__)
-/* Each operation jumps to the next one itself: a processor foresees that better than the one jump of a switch. */
-static void run_from(const Instruction *i) {
+/*
+ * Each operation jumps to the next one itself: a processor foresees that better than the one jump of a switch. Returns
+ * where each is written out, by its number; without instructions it does nothing else.
+ */
+#if !defined(__clang__)
+__attribute__((optimize("no-crossjumping"))) /* gcc would merge these jumps again */
+#endif
+static const Operation *run_from(const Instruction *i) {
 #define LABELS(number, result) &&from_memory_##number, &&first_##number, &&second_##number, &&both_##number,
-    static const void *const OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
+    static const Operation OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
     double last = 0.0;
-    goto *OPERATIONS[i->op];
+    if (!i) return OPERATIONS;
+    goto *i->op;
 #define OPERATION(label, one, other, result) \
     label : {                                \
         const double a = one, b = other;     \
@@ -55,7 +62,7 @@ static void run_from(const Instruction *i) {
         last = result;                       \
         *i->to = last;                       \
         i++;                                 \
-        goto *OPERATIONS[i->op];             \
+        goto *i->op;                         \
     }
 #define OPERATIONS_OF(number, result)                       \
     OPERATION(from_memory_##number, *i->a, *i->b, result)   \
@@ -63,12 +70,17 @@ static void run_from(const Instruction *i) {
     OPERATION(second_##number, *i->a, last, result)         \
     OPERATION(both_##number, last, last, result)
     EACH_OPERATION(OPERATIONS_OF)
-end:;
+end:
+    return OPERATIONS;
 }
+
+static Operation operation_of(int64_t number) { return run_from(0)[number]; }
 #else
 static void run_from(const Instruction *i) {
     for (; i->op != END; i++) *i->to = result_of(i->op / 4, *i->a, *i->b);
 }
+
+static Operation operation_of(int64_t number) { return number; }
 #endif
 
 void run_prepared(const Program *program) { run_from(program->code); }
@@ -77,7 +89,7 @@ void run_rest(const Program *program) { run_from(program->rest); }
 
 int prepare_program(
     Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
-    const int64_t *others, int64_t other_count
+    const int64_t *others, int64_t other_count, const char *needed
 ) {
     char *changes = calloc((size_t)(first + count + 1), 1);
     Instruction *next = program->code = malloc((size_t)(count + 2) * sizeof(Instruction));
@@ -92,7 +104,7 @@ int prepare_program(
     const double *last = 0; /* register of the instruction before */
     for (int64_t i = 0; i <= count; i++) {
         if (i == split || i == count) {
-            *next++ = (Instruction){END, r, r, r};
+            *next++ = (Instruction){operation_of(END), r, r, r};
             last = 0;
             if (i == split) program->rest = next;
         }
@@ -100,8 +112,9 @@ int prepare_program(
         int64_t op = code[3 * i], a = code[3 * i + 1], b = code[3 * i + 2], to = first + i;
         changes[to] = changes[a] || changes[b];
         if (changes[to]) {
+            if (needed && !needed[to]) continue;
             op = 4 * op + (r + a == last) + 2 * (r + b == last);
-            *next++ = (Instruction){op, r + a, r + b, r + to};
+            *next++ = (Instruction){operation_of(op), r + a, r + b, r + to};
             last = r + to;
         } else
             r[to] = result_of(op, r[a], r[b]);
@@ -122,7 +135,7 @@ EXPORT int64_t evaluate(
     const double *data, int64_t samples, const int64_t *outputs, int64_t output_count, double *out
 ) {
     Program program;
-    if (!prepare_program(&program, code, count, count, first, r, 0, columns, column_count)) return NO_MEMORY;
+    if (!prepare_program(&program, code, count, count, first, r, 0, columns, column_count, 0)) return NO_MEMORY;
     for (int64_t i = 0; i < samples; i++) {
         for (int64_t c = 0; c < column_count; c++) r[columns[c]] = data[i * column_count + c];
         run_prepared(&program);

@@ -14,8 +14,14 @@
 enum { END = 4 * 17 }; /* beyond the operations of graph.Op */
 enum { ALL_FINITE = -1, NO_MEMORY = -2 }; /* what an integrator returns beside the first sample that is not finite */
 
+#if defined(__GNUC__)
+typedef const void *Operation; /* where it is written out */
+#else
+typedef int64_t Operation;
+#endif
+
 typedef struct {
-    int64_t op;
+    Operation op;
     const double *a, *b; /* registers of the operands */
     double *to;          /* and of the result */
 } Instruction;
@@ -28,12 +34,12 @@ typedef struct {
 /*
  * `count` instructions of three numbers each (operation, operands), the first of which writes register `first`, made
  * ready for many runs: what depends on nothing that changes is computed now and left out of the code. Registers below
- * `changing` change from run to run, and those in `others`. Instructions from `split` on are the `rest`, which runs by
- * itself. Returns 0 where there is no memory.
+ * `changing` change from run to run, and those in `others`. Left out too is what is not `needed`, a flag a register; 0
+ * where all are. Instructions from `split` on are the `rest`, which runs by itself. Returns 0 where there is no memory.
  */
 int prepare_program(
     Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
-    const int64_t *others, int64_t other_count
+    const int64_t *others, int64_t other_count, const char *needed
 );
 void forget_program(Program *program);
 void run_prepared(const Program *program);

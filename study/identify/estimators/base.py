@@ -26,6 +26,7 @@ class Settings:
     band: tuple[float, float]  # lines that the parameters are fitted to, in hertz
     local_polynomial: LocalPolynomial = field(default_factory=LocalPolynomial)  # for the estimator of this name
     settle_periods: int = 1  # at the beginning of a periodic record, which ``errors_in_variables`` leaves out
+    curves: bool = True  # whether estimators whose parameters need no A_j(f) and no coherences give them too
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,8 @@ from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.multiple_shooting import CLEAN
 from study.records import spectra
-from study.records.outputs import alone
 from study.records.prepared import whole
-from study.records.record import MOTIONS, Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.errors import DivergenceError
 
 FITS_KEPT = 4  # those of the records that the threads are working on
@@ -33,9 +32,10 @@ REFINED = 12  # free runs in which a fit follows a change of steps
 def output_error(model: Model, record: Record, settings: Settings) -> Identified:
     """Coefficients and open shape parameters of the fit itself; A_j(f) of the form that they give it."""
     fit = free_run_fit(model, record)
-    inputs = reverse_inputs(fit.model)
-    matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
-    result = responses_with_errors(inputs, fit.estimate, matrix)
+    inputs, result = reverse_inputs(fit.model), None
+    if settings.curves:
+        matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
+        result = responses_with_errors(inputs, fit.estimate, matrix)
     return Identified(inputs, result, named_parameters(fit.estimate), fit.estimate, _note(fit))
 
 
@@ -52,13 +52,15 @@ def instrumental(model: Model, record: Record, settings: Settings) -> Identified
         matrix, inputs, settings.band, fitted_functions(inputs, fit.estimate, matrix.frequency),
         instruments.stretches(values, record.dt, settings.segments),
     )  # fmt: skip
+    shapes = _shapes_of(fit, [key for key in model.values if "." in key])
+    named = (*named_parameters(estimate), *named_parameters(shapes))
+    found = Identified(inputs, None, named, estimate, _note(fit), shapes)
+    if not settings.curves:
+        return found
     coherences = analyse(
         spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
     )
-    shapes = _shapes_of(fit, [key for key in model.values if "." in key])
-    named = (*named_parameters(estimate), *named_parameters(shapes))
-    responses = instruments.instrumental_responses(matrix)
-    return Identified(inputs, responses, named, estimate, _note(fit), shapes, coherences)
+    return replace(found, responses=instruments.instrumental_responses(matrix), analysis=coherences)
 
 
 def miso_free_shape(model: Model, record: Record, settings: Settings) -> Identified:
@@ -88,13 +90,10 @@ def _shapes_of(fit: FreeRunFit, keys: Collection[str]) -> Estimate:
 
 def clean_motion(fit: FreeRunFit, record: Record) -> Record:
     """The record with displacement and velocity of the fitted model in free run."""
-    motions = {
-        name: prepare(
-            fit.model, record, sensors=alone(name).sensors, steps_per_sample=fit.steps_per_sample, restarts=fit.restarts
-        ).respond_by_segment({}, fit.initial)[0][:, 0]
-        for name in MOTIONS[:2]
-    }
-    return record.with_channels(motions)
+    sensors = [Sensor(ALONE, name) for name in MOTIONS[:2]]
+    run = prepare(fit.model, record, sensors=sensors, steps_per_sample=fit.steps_per_sample, restarts=fit.restarts)
+    motions = np.ascontiguousarray(run.respond_by_segment({}, fit.initial)[0].T)
+    return record.with_channels(dict(zip(MOTIONS, motions, strict=False)))
 
 
 @lru_cache(maxsize=FITS_KEPT)

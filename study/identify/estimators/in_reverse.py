@@ -12,7 +12,7 @@ from study.equations.model import Model
 from study.equations.terms import LIBRARY
 from study.identify.estimators.base import Identified, Parameter, Settings, named_parameters
 from study.identify.frequency_domain.coefficients import Responses, fit_coefficients, lines_in
-from study.identify.frequency_domain.conditioned import analyse
+from study.identify.frequency_domain.conditioned import MisoResult, analyse
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial import (
     Lines,
@@ -21,8 +21,8 @@ from study.identify.frequency_domain.local_polynomial import (
     transform,
 )
 from study.identify.frequency_domain.periodic import fit_periodic, steady
-from study.records import spectra
 from study.records.record import Record
+from study.records.spectra import Segments, SpectralMatrix, cross_spectra
 from study.support.arrays import Complexes, Floats
 
 LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines above zero, where no mean is lost
@@ -30,17 +30,23 @@ LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines
 
 def siso(model: Model, record: Record, settings: Settings) -> Identified:
     """The best linear fit, L_1(f) = G_1y / G_11, (4.23), which the report's dashed curves show."""
-    return _by_conditioned_spectra([i for i in reverse_inputs(model) if i.linear], record, settings)
+    inputs = [i for i in reverse_inputs(model) if i.linear]
+    return identify_spectra(inputs, analyse(reverse_spectra(inputs, record, settings.segments)), settings)
 
 
 def miso(model: Model, record: Record, settings: Settings) -> Identified:
     """The report's estimator: A_j(f) of every input by (4.23) to (4.28), coefficients by weighted least squares."""
-    return _by_conditioned_spectra(reverse_inputs(model), record, settings)
+    inputs = reverse_inputs(model)
+    return identify_spectra(inputs, analyse(reverse_spectra(inputs, record, settings.segments)), settings)
 
 
-def _by_conditioned_spectra(inputs: Sequence[Input], record: Record, settings: Settings) -> Identified:
-    matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
-    result = analyse(matrix)
+def reverse_spectra(inputs: Sequence[Input], record: Record, segments: Segments) -> SpectralMatrix:
+    """Cross-spectra of the inputs and, last, the force."""
+    return cross_spectra([*histories(inputs, record), record["force"]], record.dt, segments)
+
+
+def identify_spectra(inputs: Sequence[Input], result: MisoResult, settings: Settings) -> Identified:
+    """Coefficients from the analysis of the inputs' spectra."""
     estimate = fit_coefficients(result, inputs, settings.band, settings.segments.line_inflation())
     return Identified(tuple(inputs), result, named_parameters(estimate), estimate)
 
@@ -48,14 +54,15 @@ def _by_conditioned_spectra(inputs: Sequence[Input], record: Record, settings: S
 def local_polynomial(model: Model, record: Record, settings: Settings) -> Identified:
     """One transform of the whole record, no window, no leakage of its ends: A_j(f) in narrow bands."""
     inputs = reverse_inputs(model)
-    return identify_lines(inputs, transform([*histories(inputs, record), record["force"]], record.dt), settings)
+    lines = transform([*histories(inputs, record), record["force"]], record.dt)
+    return identify_lines(inputs, lines, settings)[0]
 
 
-def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> Identified:
-    """The same for the transforms of any inputs and, last, of what they make up."""
-    estimate, _ = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
-    responses = local_polynomial_responses(lines, settings.local_polynomial)
-    return Identified(inputs, responses, named_parameters(estimate), estimate)
+def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> tuple[Identified, Floats]:
+    """The same for the transforms of any inputs and, last, of what they make up; and the fit's shifts."""
+    estimate, shifts = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
+    responses = local_polynomial_responses(lines, settings.local_polynomial) if settings.curves else None
+    return Identified(inputs, responses, named_parameters(estimate), estimate), shifts
 
 
 def errors_in_variables(model: Model, record: Record, settings: Settings) -> Identified:

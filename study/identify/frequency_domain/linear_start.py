@@ -7,13 +7,15 @@ structures where sensors are missing, the error of H itself is minimised.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import acting, linear_keys, matrices, patterns
 from study.equations.model import Model
+from study.equations.terms import LINEAR
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, cross_spectra_within, segment_length
@@ -28,6 +30,7 @@ MOST_LINES = 300
 LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
 LOCAL_MINIMUM = 0.01  # share of the responses' power: a search that leaves more has ended at one
 WEIGHTED_SOLUTIONS, SEARCH_RUNS = 6, 40
+STARTS_KEPT = 2  # of the records that the threads are working on
 DRAWN, STARTED, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
 
 
@@ -50,8 +53,8 @@ class SensorResponses:
     error: Floats
 
 
-def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
-    """The best linear approximation of the sensors by the forces on the fitting part.
+def frequency_responses(prepared: Prepared, model: Model, loose: bool) -> SensorResponses:
+    """The best linear approximation of the sensors by the forces on the fitting part; of a ``loose`` model it is said.
 
     Raises
     ------
@@ -79,7 +82,7 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
     if np.count_nonzero(keep) < 4:
         said = f"forces and motions of {prepared.record.name!r} have nothing in common at any frequency"
         floats = f"nothing ties {model.name!r} down and what is measured drifts; expected accelerations, which do not"
-        raise StudyError(f"{said}: {floats}" if loose_motions(model) else said)
+        raise StudyError(f"{said}: {floats}" if loose else said)
     noise = own * np.maximum(1.0 - coherence, LEAST_ERROR) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
     thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // MOST_LINES)]
@@ -163,8 +166,10 @@ def _real(values: Complexes) -> Floats:
     return np.concatenate([values.real, values.imag], axis=axis)
 
 
-def _problem(model: Model, prepared: Prepared, held: Mapping[str, float]) -> tuple[_Linear, list[str]]:
-    responses = frequency_responses(prepared, model)
+def _problem(
+    model: Model, prepared: Prepared, held: Mapping[str, float], loose: bool
+) -> tuple[_Linear, list[str]]:  # fmt: skip
+    responses = frequency_responses(prepared, model, loose)
     orders, own = linear_keys(model), patterns(model)
     s = 1j * responses.omega
     free = [key for key in orders if key not in held]
@@ -174,7 +179,7 @@ def _problem(model: Model, prepared: Prepared, held: Mapping[str, float]) -> tup
         if key in held:
             known += held[key] * s[:, None, None] ** orders[key] * own[key]
     units = np.array([s[:, None, None] ** orders[key] * own[key] for key in free], dtype=np.complex128)
-    force = acting(model.with_values(held))
+    force = acting(model.with_values({key: held[key] for key in orders if key in held}))
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1).astype(np.complex128)
     rows = [model.coordinates.index(x.coordinate) for x in prepared.sensors]
     heavy = [i for i, key in enumerate(free) if orders[key] == 2 and "," not in key]
@@ -192,7 +197,17 @@ def lumped_start(model: Model, prepared: Prepared, held: Mapping[str, float]) ->
     StudyError
         If nothing drives the structure, or no structure of this kind responds like it.
     """
-    problem, free = _problem(model, prepared, held)
+    linear = replace(model, terms=tuple(t for t in model.terms if t.term.name in LINEAR))
+    return dict(_of_linear_terms(linear, prepared, tuple(held.items()), loose_motions(model) > 0))
+
+
+@lru_cache(maxsize=STARTS_KEPT)
+def _of_linear_terms(
+    model: Model, prepared: Prepared, known: tuple[tuple[str, float], ...], loose: bool
+) -> dict[str, float]:  # fmt: skip
+    """The same of the linear terms alone; cached, as a fit asks again, and so do others beside other effects."""
+    held = dict(known)
+    problem, free = _problem(model, prepared, held, loose)
     if not free:
         return {}
     points = [point for x in problem.rounds() if (point := problem.point(x)) is not None]

@@ -45,7 +45,18 @@ def expected_spectra(
     own = np.sum([w * (h - mean) @ (h - mean).T for w, h in zip(weights, moved, strict=True)], axis=0) / len(clean)
     matrix = cross_spectra([*mean, clean["force"]], clean.dt, segments)
     covariance = np.zeros((len(mean) + 1, len(mean) + 1))
-    covariance[:-1, :-1], covariance[-1, -1] = own, force
-    white = np.full(len(matrix.frequency), 2.0 * clean.dt)
+    covariance[:-1, :-1] = own
+    return with_force_noise(_with_white(matrix, covariance, clean.dt), force, clean.dt)
+
+
+def with_force_noise(matrix: SpectralMatrix, force: float, dt: float) -> SpectralMatrix:
+    """Expected cross-spectra with white noise of so large a variance on the force, which goes with no input."""
+    covariance = np.zeros(matrix.density.shape[1:])
+    covariance[-1, -1] = force
+    return _with_white(matrix, covariance, dt)
+
+
+def _with_white(matrix: SpectralMatrix, covariance: Floats, dt: float) -> SpectralMatrix:
+    white = np.full(len(matrix.frequency), 2.0 * dt)
     white[[0, -1]] /= 2.0  # one-sided: zero and Nyquist frequency are not doubled
     return replace(matrix, density=matrix.density + white[:, None, None] * covariance)

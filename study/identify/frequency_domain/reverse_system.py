@@ -17,7 +17,7 @@ from study.identify.estimators.base import Identified, Settings, named_parameter
 from study.identify.estimators.in_reverse import identify_lines
 from study.identify.frequency_domain import coefficients, conditioned, local_polynomial
 from study.identify.frequency_domain.inputs import INERTIA, Input, along, histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial import Lines, transform
+from study.identify.frequency_domain.local_polynomial import transform
 from study.records import spectra
 from study.records.prepared import Prepared
 from study.records.record import FORCE, Record, Sensor
@@ -181,17 +181,10 @@ def _linear(equation: Equation) -> Equation:
 def by_local_polynomials(equations: Sequence[Equation], dt: float, settings: Settings) -> ReverseSystem:
     """Every equation by local polynomials, with the covariance from the scatter between stretches of time."""
     lines = [transform(equation.channels, dt) for equation in equations]
-    results = [_result(e, identify_lines(e.inputs, x, settings)) for e, x in zip(equations, lines, strict=True)]
-    shifts = np.concatenate([_shifts(e, x, settings) for e, x in zip(equations, lines, strict=True)], axis=1)
+    fits = [identify_lines(e.inputs, x, settings) for e, x in zip(equations, lines, strict=True)]
+    results = [EquationResult(e.coordinate, e.mass, found) for e, (found, _) in zip(equations, fits, strict=True)]
+    shifts = np.concatenate([own for _, own in fits], axis=1)
     return ReverseSystem(tuple(results), local_polynomial.covariance_between(shifts, shifts))
-
-
-def _shifts(equation: Equation, lines: Lines, settings: Settings) -> Floats:
-    return local_polynomial.fit_local_polynomial(lines, equation.inputs, settings.band, settings.local_polynomial)[1]
-
-
-def _result(equation: Equation, found: Identified) -> EquationResult:
-    return EquationResult(equation.coordinate, equation.mass, found)
 
 
 STRUCTURE_ESTIMATORS = {"siso": linear_alone, "miso": by_conditioned_spectra, "local_polynomial": by_local_polynomials}

@@ -21,7 +21,7 @@ from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Bools, Floats
 from study.support.errors import DivergenceError, StudyError
-from study.support.levenberg_marquardt import RELATIVE_OFFSET, ContinuityGaps, End, Point, minimise, point_at
+from study.support.levenberg_marquardt import RELATIVE_OFFSET, ContinuityGaps, End, Point, minimise, point_at, with_gaps
 
 FARTHEST = 1e9  # times its start: a mass that the motion does not show at all runs off without end
 
@@ -282,8 +282,8 @@ class _Problem:
         states[:, : self.free_states] = x[len(self.run.keys) :].reshape(len(states), self.free_states)
         return states
 
-    def linearise(self, x: Floats) -> Point | None:
-        """Residual and Jacobian at x; None where the model has no finite response there."""
+    def values(self, x: Floats) -> dict[str, float] | None:
+        """Values of the keys in the variables; None where no model may have them."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
         if any(not 0.0 < values[key] <= max(limit, 0.0) for key, limit in self.positive.items()):
             return None
@@ -291,7 +291,30 @@ class _Problem:
             return None
         if self.modal is not None and np.any(self.modal.rates(values) * self.run.dt > np.pi):
             return None
-        states = self.states(x)
+        return values
+
+    def cost(self, x: Floats) -> float:
+        """Sum of squares that :meth:`linearise` has at x; infinite where the model has no finite response there."""
+        values, states = self.values(x), self.states(x)
+        if values is None:
+            return np.inf
+        try:
+            response, arrivals = self.run.move_by_segment(values, states)
+        except DivergenceError:
+            return np.inf
+        residual = self._weighted(self.measured - self.outputs.stacked(response))
+        if len(self.penalty):
+            residual = np.concatenate([residual, -self.penalty @ x[: len(self.run.keys)]])
+        with np.errstate(over="ignore", invalid="ignore"):  # what is out of range lowers nothing
+            if self.weights is not None:
+                residual = with_gaps(residual, self.weights * (arrivals - states[1:]))
+            return float(residual @ residual)
+
+    def linearise(self, x: Floats) -> Point | None:
+        """Residual and Jacobian at x; None where the model has no finite response there."""
+        values, states = self.values(x), self.states(x)
+        if values is None:
+            return None
         try:
             response, jacobian, arrivals = self.run.respond_by_segment(values, states, self.free_states)
         except DivergenceError:
@@ -302,9 +325,7 @@ class _Problem:
                 gaps = self.weights * (arrivals[:, :, 0] - states[1:])
                 continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
         residual, jacobian = self.measured - self.outputs.stacked(response), self.outputs.stacked(jacobian)
-        if self.kept is not None:
-            residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]
-        residual, jacobian = (self.outputs.whitened(x, self.noise) for x in (residual, jacobian))
+        residual, jacobian = self._weighted(residual), self._weighted(jacobian)
         begins = (0, *(len(self.outputs) * cut for cut in self.run.cuts))
         if len(self.penalty):
             keys, beside = len(self.run.keys), np.zeros((len(self.penalty), jacobian.shape[1]))
@@ -312,6 +333,12 @@ class _Problem:
             residual = np.concatenate([residual, -self.penalty @ x[:keys]])
             jacobian = np.concatenate([jacobian, beside])
         return point_at(x, residual, jacobian, len(self.run.keys), begins, continuity)
+
+    def _weighted(self, stacked: Floats) -> Floats:
+        """Stacked values, zero where samples are lost, weighted by the noise; or columns of them."""
+        if self.kept is not None:
+            stacked = stacked * (self.kept if stacked.ndim == 1 else self.kept[:, None])
+        return self.outputs.whitened(stacked, self.noise)
 
     def residual(self, x: Floats) -> Floats:
         """Measured minus predicted motion at x, stacked."""
@@ -325,7 +352,7 @@ class _Problem:
         if point is None:
             values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
             raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.time(0))
-        return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset)
+        return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset, self.cost)
 
 
 def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:

@@ -75,16 +75,23 @@ def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
     then those beside all of them, shape (n s, keys), whose regression has the same coefficients and errors (Frisch and
     Waugh, 1933).
     """
-    if not fit.restarts:
-        return with_states(fit, prepared)
+    return run_and_slopes(fit, prepared)[1]
+
+
+def run_and_slopes(fit: FreeRunFit, prepared: Prepared) -> tuple[Floats, Floats]:
+    """The free run on the samples that were fitted, shape (n, s), and what :func:`linearise` gives."""
     values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
-    derivatives = _known(run.respond_by_segment(values, fit.initial, run.moving)[1], prepared, fit.span)
+    if not fit.restarts:
+        motion, derivatives = run.respond(values, fit.initial, run.moving)
+        return motion.copy(), _known(derivatives, prepared, fit.span)
+    motion, derivatives, _ = run.respond_by_segment(values, fit.initial, run.moving)
+    derivatives = _known(derivatives, prepared, fit.span)
     keys, width = len(fit.keys), len(prepared.outputs)
     for first, last in pairwise((0, *run.cuts, run.samples)):
         own = derivatives[width * first : width * last]
         states = own[:, keys:] / np.maximum(np.linalg.norm(own[:, keys:], axis=0), np.finfo(float).tiny)
         own[:, :keys] -= states @ np.linalg.lstsq(states, own[:, :keys], rcond=1e-10)[0]
-    return derivatives[:, :keys]
+    return motion.copy(), derivatives[:, :keys]
 
 
 def with_states(fit: FreeRunFit, prepared: Prepared) -> Floats:
@@ -112,18 +119,24 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
     return clustered_covariance(columns, residual, others, len(fit.keys))
 
 
-def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
-    """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
+def integration_shift(fit: FreeRunFit, prepared: Prepared, coarse: Floats, jacobian: Floats) -> Floats:
+    """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton.
+
+    ``coarse`` and ``jacobian`` are what :func:`run_and_slopes` gives of the fit.
+    """
     try:
-        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+        fine = run_of(fit, prepared, finer=2).respond({}, fit.initial)[0]
     except DivergenceError:  # a motion that stays finite by the error of its integration alone
         return BEYOND_MEASURE * np.ones(jacobian.shape[1])
     return least_squares(fit.whitened(jacobian), fit.whitened(prepared.outputs.stacked(coarse - fine)))
 
 
-def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
-    """Covariance of a fit's estimates, shape (keys + 2, keys + 2): of the noise, and of the integration's own error."""
-    moved = integration_shift(fit, prepared, jacobian)
+def uncertainty(fit: FreeRunFit, prepared: Prepared, coarse: Floats, jacobian: Floats) -> Floats:
+    """Covariance of a fit's estimates, shape (keys + 2, keys + 2): of the noise, and of the integration's own error.
+
+    ``coarse`` and ``jacobian`` are what :func:`run_and_slopes` gives of the fit.
+    """
+    moved = integration_shift(fit, prepared, coarse, jacobian)
     with np.errstate(over="ignore"):  # where a run drifts away the shift is beyond all measure
         return covariance_of(fit, jacobian) + np.outer(moved, moved)
 

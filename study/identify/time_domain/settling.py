@@ -12,7 +12,7 @@ from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit, released
 from study.identify.time_domain.motion_start import from_the_motion, seen_everywhere
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
-from study.identify.time_domain.part_fit import SEARCH_STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.identify.time_domain.part_fit import SEARCH_STEPS, covariance_of, fit_part, integration_shift, run_and_slopes
 from study.identify.time_domain.shooting import slowest_rate
 from study.identify.time_domain.stretch_states import POOR, is_poor
 from study.records.prepared import FORCE, Prepared
@@ -110,8 +110,8 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     allowed = SHIFT if prepared.every == 1 else SMALL_SHIFT
     while fit.steps_per_sample < most:
         whole = released(fit)
-        jacobian = linearise(whole, prepared)
-        moved = integration_shift(whole, prepared, jacobian)
+        coarse, jacobian = run_and_slopes(whole, prepared)
+        moved = integration_shift(whole, prepared, coarse, jacobian)
         deviations = np.sqrt(np.diag(covariance_of(whole, jacobian)))
         with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
             excess = float(np.max(np.abs(moved) / np.maximum(allowed * deviations, np.finfo(float).tiny)))

@@ -68,21 +68,25 @@ def needed_restarts(
     nothing = np.empty((0, *weighted.shape[1:]))
     grown = nothing  # from each restart that matters to where the present segment ends
     own = own_begins(record, span)
-    alone = np.linalg.norm(weighted, 2, axis=(1, 2))  # of each segment: most are all that there is to look at
+    alone = _largest(weighted)  # of each segment: most are all that there is to look at
     for begin, through, size in zip((span[0], *restarts[:-1]), weighted, alone, strict=True):
         if begin in own:  # nothing from before reaches a motion that begins anew
             grown = nothing
         if not len(grown) and size <= 1.0:  # shrinks, and nothing from before is left to grow
             continue
         grown = through @ grown
-        before: Floats = np.linalg.norm(grown, 2, axis=(1, 2)) if len(grown) else np.empty(0)
-        sizes: Floats = np.concatenate([before, [size]])
+        sizes: Floats = np.append(_largest(grown), size)
         grown = np.concatenate([grown, through[np.newaxis]])
         if np.max(sizes) > GROWTH and len(grown) > 1:
             kept.append(begin)
             grown, sizes = grown[-1:], sizes[-1:]
         grown = grown[sizes > 1.0]  # what has shrunk can grow no further than what begins here will
     return tuple(kept)
+
+
+def _largest(matrices: Floats) -> Floats:
+    """By how much each matrix magnifies at most, shape (matrices,)."""
+    return np.asarray(np.linalg.svd(matrices, compute_uv=False), dtype=np.float64)[:, 0]
 
 
 def _independent(motions: Floats) -> Floats:

@@ -28,6 +28,7 @@ from study.figures import page
 from study.figures.labels import term_names
 from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, displacement_noise, force
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.record_layout import Layout
 from study.reproduction.chapters.chapter import Chapter, SensorSettings, Tables, judges
@@ -57,13 +58,14 @@ def make_sensors(_: ClaimSettings, own: SensorSettings, models: Path) -> Tables:
         without = without.with_values(dict.fromkeys(k for k in without.values if "." not in k))  # shapes are known
         for sensors in case.sensors:
             record, about = _seen(full, sensors.split(), own), {"structure": structure, "sensors": sensors}
+            opened = truth.with_values(dict.fromkeys(k for k in truth.values if "." not in k))
+            # The candidates differ in a term, which asks for no other layout.
+            opened, prepared = made_ready([record], opened, Layout())
             for effect, place, model in _candidates(without, case.effects):
                 hidden = any(t.term.name == effect and t.place.path == place.path for t in truth.terms)
                 told = {**about, "effect": effect, "place": "-".join(place.ends), "right": hidden}
-                tried.append({**told, **_judged(model, record)})
-            opened = truth.with_values(dict.fromkeys(k for k in truth.values if "." not in k))
-            model, prepared = made_ready([record], opened, Layout())
-            fit = fit_model(model, prepared)
+                tried.append({**told, **_judged(model, prepared)})
+            fit = fit_model(opened, prepared)
             values += [
                 {**about, "parameter": key, "true": truth.numbers()[key], "estimate": fit.estimate[key],
                  "standard_error": fit.estimate.error(key), "note": "" if fit.converged else fit.message}
@@ -96,10 +98,9 @@ def _candidates(without: Model, effects: Sequence[str]) -> Iterator[tuple[str, P
                 yield effect, place, replace(without, terms=(*without.terms, free(get(effect), place)))
 
 
-def _judged(model: Model, record: Record) -> dict[str, Any]:
+def _judged(model: Model, prepared: Prepared) -> dict[str, Any]:
     try:
-        ready, prepared = made_ready([record], model, Layout())
-        found = predict(fit_model(ready, prepared), prepared)
+        found = predict(fit_model(model, prepared), prepared)
     except StudyError as error:
         return {"error": np.nan, "floor": np.nan, "note": str(error)}
     return {"error": found.error, "floor": found.floor, "note": ""}

@@ -32,10 +32,11 @@ from study.identify import estimators
 from study.identify.estimators.base import Settings, named_parameters, true_parameters
 from study.identify.frequency_domain.coefficients import fit_coefficients
 from study.identify.frequency_domain.conditioned import analyse
-from study.identify.frequency_domain.inputs import reverse_inputs
-from study.identify.frequency_domain.noisy_inputs import expected_spectra
+from study.identify.frequency_domain.inputs import Input, reverse_inputs
+from study.identify.frequency_domain.noisy_inputs import expected_spectra, with_force_noise
 from study.records.excitation import displacement_noise, theoretical_autospectrum
 from study.records.record import Record
+from study.records.spectra import Segments, SpectralMatrix
 from study.reproduction.cases import make_record
 from study.reproduction.chapters.chapter import (
     Chapter,
@@ -72,13 +73,14 @@ def make_noise(study: ClaimSettings, own: NoiseSettings, models: Path) -> Tables
     """
     model = read_model(models / f"{own.system}.yaml")
     begun = replace(model, terms=tuple(entry.opened() for entry in model.terms))
+    settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]), curves=False)
     rows: list[dict[str, Any]] = []
     for force, used in ((RANDOM, own.estimators), (PERIODIC_FORCE, own.periodic_estimators)):
         for seed in range(own.first_seed, own.first_seed + own.seeds):
             if force == PERIODIC_FORCE and seed >= own.first_seed + own.free_runs:
                 used = tuple(name for name in used if name not in ON_A_FREE_RUN)
             for cell in _noisy_records(model, study, own, force, seed):
-                rows += [{"force": force, "seed": seed, **row} for row in _found(model, begun, cell, study, used)]
+                rows += [{"force": force, "seed": seed, **row} for row in _found(model, begun, cell, settings, used)]
     table = _over_seeds(pd.DataFrame(rows), true_parameters(model.values))
     return {"noise": table, "noise_best": best_estimators(table, own)}
 
@@ -92,6 +94,7 @@ class _Noisy:
     force_noise: float
     displacement_noise: float
     attenuation: float  # G_nn / G_FF
+    expected: Mapping[str, SpectralMatrix]  # of the noise on the displacement, by the estimator ``BY_LEAST_SQUARES``
 
 
 def _noisy_records(
@@ -108,20 +111,34 @@ def _noisy_records(
     lines = np.linspace(study.fit_band[0], study.fit_band[1], n // 64)
     density = theoretical_autospectrum(excitation.at_level(level), lines, n, dt)
     ratio = 2.0 * dt * float(np.mean(clean["force"] ** 2)) / float(np.mean(density))
+    expected = {on_motion: _expected(model, clean, on_motion, study.segments.segments()) for on_motion in own.levels}
     for number, (on_force, on_motion) in enumerate(product(own.levels, repeat=2)):
         stream = NOISE_OFFSET + 2 * (seed * len(own.levels) ** 2 + number)
         changed = {
             channel: clean[channel] + displacement_noise(clean[channel], share, stream + side)
             for side, (channel, share) in enumerate((("force", on_force), ("displacement", on_motion)))
         }
-        yield _Noisy(clean, clean.with_channels(changed), on_force, on_motion, on_force * ratio)
+        yield _Noisy(
+            clean, clean.with_channels(changed), on_force, on_motion, on_force * ratio, expected[on_motion]
+        )  # fmt: skip
+
+
+def _expected(model: Model, clean: Record, on_motion: float, segments: Segments) -> dict[str, SpectralMatrix]:
+    """Spectra that least squares sees in expectation, but for noise on the force, of which there is any beside it."""
+    variance = on_motion * float(np.mean(clean["displacement"] ** 2))
+    return {
+        name: expected_spectra(_inputs_of(model, name), clean, variance, 0.0, segments) for name in BY_LEAST_SQUARES
+    }
+
+
+def _inputs_of(model: Model, estimator: str) -> list[Input]:
+    return [i for i in reverse_inputs(model) if i.linear or estimator == "miso"]
 
 
 def _found(
-    model: Model, begun: Model, cell: _Noisy, study: ClaimSettings, used: tuple[str, ...]
+    model: Model, begun: Model, cell: _Noisy, settings: Settings, used: tuple[str, ...]
 ) -> Iterator[dict[str, Any]]:
     """Estimates of each parameter by each estimator, with what theory has them tend to; ``begun`` has the starts."""
-    settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]))
     exact = true_parameters(model.values)
     for name in used:
         theory: Mapping[str, float] = {}
@@ -141,10 +158,8 @@ def _found(
 
 
 def _tends_to(model: Model, cell: _Noisy, settings: Settings, name: str) -> dict[str, float]:
-    inputs = [i for i in reverse_inputs(model) if i.linear or name == "miso"]
-    displacement, force = (float(np.mean(cell.clean[channel] ** 2)) for channel in ("displacement", "force"))
-    noise = cell.displacement_noise * displacement, cell.force_noise * force
-    matrix = expected_spectra(inputs, cell.clean, *noise, settings.segments)
+    inputs, variance = _inputs_of(model, name), cell.force_noise * float(np.mean(cell.clean["force"] ** 2))
+    matrix = with_force_noise(cell.expected[name], variance, cell.clean.dt)
     estimate = fit_coefficients(analyse(matrix), inputs, settings.band, settings.segments.line_inflation())
     return {p.name: p.value for p in named_parameters(estimate)}
 

@@ -26,12 +26,13 @@ from study.figures.labels import term_names
 from study.figures.styles import look
 from study.identify import estimators
 from study.identify.estimators.base import Identified, Settings, true_parameters
+from study.identify.estimators.in_reverse import identify_spectra, reverse_spectra
 from study.identify.frequency_domain.coefficients import independent_share
-from study.identify.frequency_domain.conditioned import MisoResult
-from study.identify.frequency_domain.inputs import histories
+from study.identify.frequency_domain.conditioned import MisoResult, analyse
+from study.identify.frequency_domain.inputs import reverse_inputs
 from study.records.excitation import displacement_noise
 from study.records.record import Record
-from study.records.spectra import autospectrum, cross_spectra
+from study.records.spectra import SpectralMatrix
 from study.reproduction.cases import make_record
 from study.reproduction.chapters.chapter import Chapter, DrivenSettings, Tables, judges
 from study.reproduction.claims.judgement import Condition, explained
@@ -121,12 +122,12 @@ def _estimates(
         relative={**study.tolerances.relative, **study.tolerances.of_case.get(record.name, {})},
         absolute=study.tolerances.absolute,
     )  # fmt: skip
+    settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]), curves=False)
+    matrix = reverse_spectra(reverse_inputs(model), record, settings.segments)
+    result = analyse(matrix)
     for estimator in used:
-        settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]))
-        if estimator == DRIVEN_LINES:
-            settings = replace(settings, band=_driven_band(record, settings, own.driven))
         try:
-            found = estimators.identify("miso" if estimator == DRIVEN_LINES else estimator, model, record, settings)
+            found = _identified(estimator, model, record, settings, matrix, result, own.driven)
         except (DivergenceError, StudyError):  # too few lines, or a fit that leaves the range of numbers
             yield {
                 "estimator": estimator,
@@ -136,7 +137,7 @@ def _estimates(
                 "surprise": np.inf,
             }
             continue
-        seen = _seen(found, record, settings, own.driven) if estimator == "miso" else {}
+        seen = _seen(result, matrix, settings, own.driven) if estimator == "miso" else {}
         for p in found.parameters:
             if p.name not in exact:
                 continue  # a system without stiffness has neither f_n nor zeta
@@ -151,18 +152,27 @@ def _estimates(
             }  # fmt: skip
 
 
-def _driven_band(record: Record, settings: Settings, least: float) -> tuple[float, float]:
+def _identified(
+    estimator: str, model: Model, record: Record, settings: Settings, matrix: SpectralMatrix, result: MisoResult,
+    least: float,
+) -> Identified:  # fmt: skip
+    """What an estimator finds; ``result`` is the analysis of the record's spectra that MI/SO of any lines rests on."""
+    if estimator == DRIVEN_LINES:
+        settings = replace(settings, band=_driven_band(matrix, settings, least))
+    if estimator in ("miso", DRIVEN_LINES):
+        return identify_spectra(reverse_inputs(model), result, settings)
+    return estimators.identify(estimator, model, record, settings)
+
+
+def _driven_band(matrix: SpectralMatrix, settings: Settings, least: float) -> tuple[float, float]:
     """From the first line of the fit band that the force drives to the last, in hertz."""
-    frequency, density = autospectrum(record["force"], record.dt, settings.segments)
+    frequency, density = matrix.frequency, matrix.density[:, -1, -1].real
     inside = frequency[(density > least * np.max(density)) & (frequency > 0.0)]
     return max(settings.band[0], float(inside[0])), min(settings.band[1], float(inside[-1]))
 
 
-def _seen(found: Identified, record: Record, settings: Settings, least: float) -> dict[str, float]:
+def _seen(result: MisoResult, matrix: SpectralMatrix, settings: Settings, least: float) -> dict[str, float]:
     """What a user sees of a record's excitation, the truth unknown."""
-    result = found.responses
-    assert isinstance(result, MisoResult)
-    matrix = cross_spectra([*histories(found.inputs, record), record["force"]], record.dt, settings.segments)
     keep = (result.frequency >= settings.band[0]) & (result.frequency <= settings.band[1])
     force = matrix.density[:, -1, -1].real
     return {
