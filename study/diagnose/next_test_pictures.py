@@ -29,7 +29,6 @@ RIVAL_LOOKS: tuple[dict[str, Any], ...] = (
     {"linestyle": (0, (6, 1, 1, 1, 1, 1)), "color": "0.3", "linewidth": 1.3},
     {"linestyle": (0, (1, 3)), "color": "C5", "linewidth": 2.4},
 )  # fmt: skip
-PAGE_WIDTH = 7.8  # inches
 
 
 def next_test_pictures(found: NextTest) -> dict[str, bytes]:
@@ -45,11 +44,12 @@ def next_test_figure(found: NextTest) -> Figure:
         "what drives it": driving_panel, "what each would answer, where they differ most": answers_panel,
         "evidence against each of the others, if the first is true": evidence_panel,
     }  # fmt: skip
+    width = 7.8  # inches
     drawn = list(panels.items())[1 if found.choice.design.kind == LET_GO else 0 :]
-    columns = page.legend_columns([rival_in_words(row, found.rivals.rows) for row in found.rivals.rows], PAGE_WIDTH)
+    columns = page.legend_columns([rival_in_words(row, found.rivals.rows) for row in found.rivals.rows], width)
     figure, axes = page.empty_page(
         f"Which test next? {found.rivals.prepared.record.name}", words, rows=len(drawn), panel=1.7,
-        legend_rows=-(-len(found.rivals.rows) // columns), share=False, width=PAGE_WIDTH,
+        legend_rows=-(-len(found.rivals.rows) // columns), share=False, width=width,
     )  # fmt: skip
     for own, (_, draw) in zip(axes, drawn, strict=True):
         draw(own, found)

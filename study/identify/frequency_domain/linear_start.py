@@ -30,7 +30,6 @@ MOST_LINES = 300
 LEAST_ERROR = 1e-4  # share of a response that counts as its error at least, where there is no noise
 LOCAL_MINIMUM = 0.01  # share of the responses' power: a search that leaves more has ended at one
 WEIGHTED_SOLUTIONS, SEARCH_RUNS = 6, 40
-STARTS_KEPT = 2  # of the records that the threads are working on
 DRAWN, STARTED, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
 
 
@@ -201,7 +200,7 @@ def lumped_start(model: Model, prepared: Prepared, held: Mapping[str, float]) ->
     return dict(_of_linear_terms(linear, prepared, tuple(held.items()), loose_motions(model) > 0))
 
 
-@lru_cache(maxsize=STARTS_KEPT)
+@lru_cache(maxsize=2)  # of the records that the threads are working on
 def _of_linear_terms(
     model: Model, prepared: Prepared, known: tuple[tuple[str, float], ...], loose: bool
 ) -> dict[str, float]:  # fmt: skip
