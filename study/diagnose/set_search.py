@@ -62,7 +62,7 @@ class SetSearch:
                 [*(k for k in own if k in start.model.values), *held],
                 steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
                 max_iterations=TRIED,
-                initial=grown_states(begun, start.model),
+                initial=None if begun.restarts else grown_states(begun, start.model),  # segments have their own
             )
             return judged_candidate(tuple(e for n, e in self.entries.items() if n in start.names), fit, prepared)
         except StudyError:

@@ -24,7 +24,7 @@ from study.records.prepared import Prepared
 from study.records.record import Sensor
 from study.support.arrays import Floats, Ints
 from study.support.cores import side_by_side
-from study.support.errors import StudyError
+from study.support.errors import DivergenceError, StudyError
 from study.support.least_squares import least_squares, pseudo_inverse
 from study.support.statistics import Gain, clustered_covariance, gain, gain_beside, worse
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
@@ -270,11 +270,15 @@ def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Shar
     """Joint regression of the residual on the model's own sensitivities and more columns.
 
     ``columns`` are those of a fault or an effect on both parts, shapes (n, k) and (m, k). They get only what the
-    model's own coefficients and initial state cannot take; None where these can take all of it. A test of all amounts
-    or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
+    model's own coefficients and initial state cannot take; None where these can take all of it, or where what they can
+    take is beyond the range of numbers, as along a chaotic motion. A test of all amounts or, where ``leading``, of the
+    first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
-    taken = left.taking[0] @ fitted
+    try:
+        taken = left.taking[0] @ fitted
+    except DivergenceError:
+        return None
     alone = fitted - left.own[0] @ taken
     if np.any(np.linalg.norm(alone, axis=0) <= IMITATED * np.linalg.norm(fitted, axis=0)):
         return None

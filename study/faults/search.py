@@ -7,6 +7,7 @@ a single number describes is found together with the model's own coefficients.
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +53,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
-from study.support.errors import expect
+from study.support.errors import DivergenceError, expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
 LEAST_COMPETING, MOST_COMPETING = 8192, 16384  # samples of either part in which faults compete with physics
@@ -408,6 +409,14 @@ def refined(
     ``faults`` are those that ``left`` is corrected for already, besides this one with ``value``. None where the search
     leaves what is sensible, or the model does not run.
     """
+    with suppress(DivergenceError):  # derivatives leave the range of numbers long before a chaotic motion does
+        return _refined(asked, given, faults, left, value)
+    return None
+
+
+def _refined(
+    asked: Asked, given: Prepared, faults: Sequence[Fault], left: FittedResidual, value: float
+) -> Refined | None:  # fmt: skip
     name, channel = asked
     if name == HUM:
         line = hum(left.of(channel), 1)
