@@ -174,8 +174,8 @@ def those_not_tried(
 ) -> list[FittedCandidate]:
     """Fit and judge every candidate that promised too little; of two sides of a place the better stays."""
     done = {(c.term.name, c.entry.place.path) for c in tried}
-    left = [item for item in screened(entries, base) if (item.entry.term.name, item.entry.place.path) not in done]
-    return _one_side(_fitted(left, base, progress, len(tried)))
+    left = [entry for entry in entries if (entry.term.name, entry.place.path) not in done]
+    return _one_side(_fitted(screened(left, base), base, progress, len(tried)))
 
 
 def _worse(candidate: FittedCandidate) -> tuple[bool, float]:
