@@ -21,9 +21,8 @@ CHAPTERS: Mapping[str, Contents] = {
     "excitations": Contents(
         "other_spectra",
         "Forces with other spectra",
-        "Investigate force excitations with arbitrary spectral shapes (such as the Pierson-Moskowitz wind-wave "
-        "model) and "
-        "apply these excitations to various nonlinear systems.",
+        "Investigate force excitations with arbitrary spectral shapes (such as the Pierson-Moskowitz wind-wave model) "
+        "and apply these excitations to various nonlinear systems.",
         ("excitations",),
         {
             "spectra_map": "where the method breaks down",
@@ -34,8 +33,7 @@ CHAPTERS: Mapping[str, Contents] = {
         "other_forces",
         "More complicated forces",
         "Simulate extended SDOF nonlinear systems with more complicated nonlinear restoring and damping forces than "
-        "those "
-        "considered here.",
+        "those considered here.",
         ("forces", "force_coefficients", "force_coherences", "force_patterns"),
         {
             "force_patterns": "restoring force against displacement",
@@ -57,8 +55,7 @@ CHAPTERS: Mapping[str, Contents] = {
         "fewer_sensors",
         "Several degrees of freedom",
         "Develop procedures for analyzing and identifying different terms in MDOF systems and associated MDOF "
-        "nonlinear "
-        "differential equations of motion.",
+        "nonlinear differential equations of motion.",
         ("sensors", "sensor_values"),
         {"sensors_map": "which effect, at which connection, with how few sensors"},
     ),
@@ -66,8 +63,7 @@ CHAPTERS: Mapping[str, Contents] = {
         "measured_ladders",
         "Actual systems, measured data",
         "Demonstrate these procedures by investigating the properties of an actual nonlinear physical system using "
-        "measured "
-        "data.",
+        "measured data.",
         ("ladders",),
         {"ladders": "error on what was not fitted, model after model"},
     ),
@@ -75,8 +71,7 @@ CHAPTERS: Mapping[str, Contents] = {
         "not_constant",
         "Coefficients that are not constant",
         "Investigate the use of this new method for the nonlinear system identification of nonlinear equations of "
-        "motion "
-        "where the coefficients are not necessarily constants.",
+        "motion where the coefficients are not necessarily constants.",
         ("varying", "varying_values", "mathieu", "moments"),
         {"varying": "what constant coefficients leave, and when the stiffness stepped"},
     ),

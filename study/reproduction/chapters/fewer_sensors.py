@@ -198,9 +198,8 @@ def told_sensors(tables: Tables) -> list[Block]:
             percent(group["standard_error"][at] / abs(group["true"][at]), ".2g"),
         ])  # fmt: skip
     said = (
-        "Fits in free run of the model with all its terms, every coefficient open, from displacement sensors with 1 "
-        "% of noise: "
-        "the value that is farthest off."
+        "Fits in free run of the model with all its terms, every coefficient open, from displacement sensors with 1 % "
+        "of noise: the value that is farthest off."
     )
     return [Text(said), table(("structure", "sensors", "farthest off", "its standard error"), rows)]
 

@@ -147,8 +147,7 @@ def left_out_records(tables: Tables) -> list[str]:
     verb = "is" if len(missing) == 1 else "are"
     return [
         f"{enumerated(missing)} {verb} left out: the data are no part of the project; `study data` says where they "
-        f"are, "
-        "and STUDY_DATA names the folder that holds them."
+        "are, and STUDY_DATA names the folder that holds them."
     ]
 
 

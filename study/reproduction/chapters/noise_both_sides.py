@@ -454,10 +454,8 @@ def told_noise(tables: Tables) -> list[Block]:
     said = (
         "**Which estimator for my noise.** Noise is the mean square on a channel over that of the channel. Each number "
         "is the root mean square error over the seeds of the coefficient (m, c, k, k3, c3) that is farthest off, the "
-        "least "
-        "of a row in bold. The record is as long as the report's; a force that repeats has eight periods in it, of "
-        "which "
-        "the first settles."
+        "least of a row in bold. The record is as long as the report's; a force that repeats has eight periods in it, "
+        "of which the first settles."
     )
     head = ("force", "noise on force", "noise on displacement", *(look(e).label for e in used))
     return [Text(said), table(head, rows)]

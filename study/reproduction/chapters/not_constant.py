@@ -240,8 +240,7 @@ def told_varying(tables: Tables) -> list[Block]:
     ]
     said = (
         "Each system as it is and with constant coefficients alone, with 1 % of noise on the displacement: mean "
-        "multiple "
-        "coherence over the fit band, and what the free run of the fitted model leaves of the displacement."
+        "multiple coherence over the fit band, and what the free run of the fitted model leaves of the displacement."
     )
     return [
         Text(said), table(("system", "coefficients", "coherence", "left by a free run"), rows),

@@ -55,8 +55,7 @@ OCTAVES = "octaves"  # ends the names of forces that are bands of noise
 SEAS = ("calm", "moderate", "rough")
 WITHOUT_FORCE = (
     "lines without a force hold what segments leak from those with one, and their small residual gives them the "
-    "largest "
-    "weight: a mass of zero explains them best"
+    "largest weight: a mass of zero explains them best"
 )
 Driven = tuple[str, ExcitationSettings, float]  # a force: its name, its settings, its mean square
 
@@ -412,18 +411,14 @@ def told_excitations(tables: Tables) -> list[Block]:
     said = (
         "**How narrow may my band be.** In octaves about the natural frequency, the narrowest band of noise, of those "
         "tried, in which and in all wider ones every parameter is within its tolerance of Part I, and after the stroke "
-        f"within 5 %; none where the widest of {found['width'].max():g} octaves (0.75 to 12 Hz) is too narrow "
-        f"already. The "
-        f"report's force reaches from zero to 12.5 Hz. Noise is {noise} of the displacement's rms. MI/SO on driven "
-        f"lines "
-        "is fitted to lines with a force alone."
+        f"within 5 %; none where the widest of {found['width'].max():g} octaves (0.75 to 12 Hz) is too narrow already. "
+        f"The report's force reaches from zero to 12.5 Hz. Noise is {noise} of the displacement's rms. MI/SO on driven "
+        "lines is fitted to lines with a force alone."
     )
     near = (
         "**How near a breakdown is.** What MI/SO shows without the truth: mean multiple coherence over the fit band, "
-        "the "
-        "share of lines that the force drives, and the smallest share of an input that the others do not determine "
-        "(median "
-        "over the lines). Beside them the error of the worst parameter, in tolerances."
+        "the share of lines that the force drives, and the smallest share of an input that the others do not determine "
+        "(median over the lines). Beside them the error of the worst parameter, in tolerances."
     )
     miso = worst[(worst["estimator"] == "miso") & (worst["noise"] == 0.0)]
     seen = [
