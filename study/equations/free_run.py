@@ -17,7 +17,7 @@ import numpy as np
 from study.equations import kernels
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import MotionProgram, motion_program
-from study.records.interpolation import between_runs, between_samples, runs_of
+from study.records.interpolation import between_runs, between_samples, in_columns, runs_of
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
@@ -265,7 +265,7 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
     columns = [_between(record[name], factor, record.reading(name))[part] for name in driving]
-    drive = _side_by_side(columns) if columns else np.zeros((factor * (last - first), 0))
+    drive = in_columns(columns, factor * (last - first))
     return drive, ((0, record.start + first * record.dt),), None
 
 
@@ -280,18 +280,13 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
             starts.append((begin, float(run.source.time[run.first])))
             begin += len(run)
         columns = [between_runs(part, name, factor, _kept) for name in driving]
-        drive = _side_by_side(columns) if columns else np.zeros((factor * begin, 0))
+        drive = in_columns(columns, factor * begin)
         drive.flags.writeable = False
         return drive, tuple(starts), places
 
     size = 8 * (len(record) * len(record.channels) + (span[1] - span[0]) * (1 + factor * len(driving)))
     with _ONE_AT_A_TIME:
         return _MOTIONS.get((record, span, driving, factor), size, made)
-
-
-def _side_by_side(columns: Sequence[Floats]) -> Floats:
-    """Columns, shape (n, columns); a single one as it is kept, which no run changes."""
-    return columns[0][:, None] if len(columns) == 1 else np.column_stack(columns)
 
 
 def _between(values: Floats, factor: int, reading: str) -> Floats:

@@ -5,7 +5,7 @@ an integrator with several steps a sample would respond to. Band-limited interpo
 content above its Nyquist frequency.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.fft import irfft, rfft
@@ -43,6 +43,13 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
     longer = _reflected(values)
     edge = (len(longer) - n) // 2
     return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+def in_columns(values: Sequence[Floats], n: int) -> Floats:
+    """Channels side by side, shape (n, channels); a single one of a long record is not copied: no run changes it."""
+    if len(values) == 1:
+        return values[0][:, None]
+    return np.column_stack(values) if values else np.zeros((n, 0))
 
 
 def largest_between(values: Floats, factor: int) -> float:

@@ -16,7 +16,7 @@ from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE, HERE, Place
-from study.records.interpolation import between_samples
+from study.records.interpolation import between_samples, in_columns
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -165,8 +165,8 @@ def input_history(item: Input, record: Record) -> Floats:
     memory = memory_program(formula, dict(item.parameters), [name for name in wanted if name != "t"])
 
     def integrated(steps: int) -> Floats:
-        fine = [between_samples(data[name], 2 * steps)[:, None] for name in memory.drive]
-        drive = np.hstack(fine) if fine else np.zeros((2 * steps * len(record), 0))
+        fine = [between_samples(data[name], 2 * steps) for name in memory.drive]
+        drive = in_columns(fine, 2 * steps * len(record))
         states, out = np.zeros((1, 1, 1)), np.full((len(record), 1, 1), np.nan)
         start, bounds = np.array([record.time[0]]), np.array([0, len(record)])
         kernels.integrate(memory, start, record.dt, steps, drive, bounds, states, out)
