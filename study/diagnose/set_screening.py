@@ -137,7 +137,7 @@ def by_the_reverse_system(
     free = [key for key in known.values if key in spectra and key in base.fit.keys]
     fixed = [key for key in known.values if key in spectra and key not in base.fit.keys]
     target = target - sum((float(known.values[k] or 0.0) * spectra[k] for k in fixed), np.zeros(len(target)))
-    own = np.stack([spectra[key] for key in free], axis=1)
+    own = np.stack([spectra[key] for key in free], axis=1) if free else np.zeros((len(target), 0))  # all are held
     basis = np.linalg.qr(own / length_or_one(own))[0]
     columns: dict[str, Floats] = {}
     for name, entry in offered.items():

@@ -254,7 +254,7 @@ class Fit(FitPictures):
         Raises
         ------
         StudyError
-            If a formula is refused, or there is no such effect.
+            If a formula is refused, there is no such effect, or another estimator than the free run found the fit.
         """
         from study.interface.found import diagnosed
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from study.compare.by_estimator import FREE_RUN
 from study.diagnose import confirmed_faults, diagnosis_report
 from study.diagnose import verdict as verdicts
 from study.diagnose.diagnosis_files import diagnosis_in_words
@@ -233,6 +234,8 @@ class Diagnosis:
 
 def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagnosis:
     """What :meth:`Fit.diagnose` does; its arguments."""
+    by = fit.comparison.estimator
+    expect(by == FREE_RUN, f"candidates are fitted in free run; expected a fit by {FREE_RUN}, this one is by {by}")
     for name in without:
         terms.get(name)
     extra = own_candidates([f"{name}={formula}" for name, formula in own.items()], fit.comparison.model)

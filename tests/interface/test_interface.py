@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import study as st
+from study.equations.terms import LIBRARY
 
 NONLINEAR = st.Model(
     st.term("inertia", value=1.0), st.term("linear_damping", value=3.77), st.term("linear_stiffness", value=355.3),
@@ -98,6 +99,15 @@ def test_the_diagnosis_names_the_effect_and_its_frame_holds_every_candidate(foun
     with pytest.raises(st.StudyError, match="is no candidate"):
         _ = found["flux_capacitor"]
     assert "missing" in found.says
+
+
+def test_what_is_missing_beside_values_that_are_held_is_found():
+    braked = NONLINEAR.add(st.term("coulomb_friction", value=0.2))
+    record = st.simulate(braked, st.gaussian(1.0, samples=2048, seed=5), noise=1e-4, name="braked")
+    missing = ("coulomb_friction", "cubic_stiffness")
+    held = braked.drop("coulomb_friction").drop("cubic_stiffness").fit(record, measurement=False)
+    found = held.diagnose(without=[name for name in LIBRARY if name not in missing])
+    assert {effect.name for effect in found.best.effects} == set(missing)
 
 
 def test_a_candidate_is_added_as_the_command_adds_it_by_name(fit, better):
@@ -280,6 +290,7 @@ def test_wrong_use_is_one_sentence(record, fit):
         (lambda: NONLINEAR.drop("hysteresis"), "no term 'hysteresis'"),
         (lambda: fit.diagnose(without=["cubic"]), "there is no term 'cubic'"),
         (lambda: fit.diagnose({"bad": "__import__('os')"}), "'__import__"),
+        (lambda: LINEAR.fit(record, estimator="miso").diagnose(), "this one is by miso"),
         (lambda: LINEAR.fit(record, fit=(0, 10)), "must hold 64 samples"),
         (lambda: LINEAR.fit(record, response="acceleration_2"), "acceleration_2"),
         (lambda: st.gaussian(-1.0), "level of the excitation is -1"),
