@@ -331,7 +331,7 @@ def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, as
         return _Decision(UNKNOWN if missing else NOTHING, rows, left, [])
     left = _left(first.fit, first.prediction)
     alone = [first, *(r for r in rows if r.name in first.tied_with)]
-    if (first.gain.explained >= ENOUGH or left <= GOOD) and not (first.unphysical or first.wanders(asked)):
+    if _explains(first, left) and not (first.unphysical or first.wanders(asked)):
         return _Decision(MISSING, [first] + [r for r in rows if r is not first], left, alone)
     return _Decision(UNKNOWN, rows, left, alone)
 
@@ -339,6 +339,14 @@ def _of_one(first: Ranked | None, rows: list[Ranked], comparison: Comparison, as
 def _leaves_much(prediction: Prediction) -> bool:
     """Whether more than ten times as much is above the noise as models of real structures leave."""
     return prediction.above_noise > 10.0 * GOOD
+
+
+def _explains(row: Ranked, left: float) -> bool:
+    """Whether an effect or a set explains nearly all, or leaves neither what shapes of the motion see nor much.
+
+    A stiffness that changes periodically leaves what no such shape sees, whatever stands in its place.
+    """
+    return row.gain.explained >= ENOUGH or (left <= GOOD and not _leaves_much(row.prediction))
 
 
 def _nearly_all(row: Ranked) -> bool:
@@ -349,7 +357,7 @@ def _verdict_on(sets: Sequence[Ranked], left: float, prepared: Prepared, asked: 
     """What the first of the sets that the record cannot tell apart bears, beside which so much is left."""
     answer = sets[0]
     explained, one = answer.gain.explained, len(answer.entries) == 1
-    if (explained >= ENOUGH or left <= GOOD) and not answer.wanders(asked):
+    if _explains(answer, left) and not answer.wanders(asked):
         return MISSING if one else SEVERAL
     if one and _stands_out(answer, prepared):
         return MISSING

@@ -300,3 +300,13 @@ def test_too_few_steps_make_an_effect_nobodys_equal(of_drag: Diagnosis):
     size = np.std(other.prediction.measured)
     rough = replace(other, prediction=replace(other.prediction, numerical=np.array([size])))
     assert distance(rough, first, white) == apart
+
+
+@pytest.mark.parametrize(
+    ("explained", "left", "above_noise", "named"),
+    [(0.1, 0.0, 0.32, False), (0.1, 0.0, 0.002, True), (0.1, 0.05, 0.002, False), (0.999, 0.05, 0.32, True)],
+)
+def test_an_effect_that_explains_little_is_not_named_where_much_is_left(explained, left, above_noise, named):
+    """A periodic stiffness leaves what no shape of the motion sees: 32 % of the response beside a cogging of 6 %."""
+    gain, prediction = SimpleNamespace(explained=explained), SimpleNamespace(above_noise=above_noise)
+    assert verdict._explains(SimpleNamespace(gain=gain, prediction=prediction), left) is named
