@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from study.cli import main
@@ -145,7 +146,9 @@ def test_what_a_structure_cannot_have_is_refused_in_one_sentence(folder, capsys,
 
 
 def test_a_fault_that_is_held_beside_a_structure_is_that_of_its_channel(folder, capsys, tmp_path):
-    (tmp_path / "b.csv").write_bytes((folder / "b.csv").read_bytes())
+    shifted = pd.read_csv(folder / "b.csv")
+    shifted["b displacement"] += 0.25
+    shifted.to_csv(tmp_path / "b.csv", index=False)
     words = ["compare", str(tmp_path / "b.csv"), "--model", str(folder / "pair.yaml"), "--out", str(tmp_path / "out")]
     (tmp_path / "b.record.yaml").write_text("measurement: {offset: {b displacement: 0.25}, delay: off}\n")
     assert main(words) == 0
@@ -159,6 +162,7 @@ def test_a_fault_that_is_held_beside_a_structure_is_that_of_its_channel(folder, 
     (tmp_path / "b.record.yaml").write_text("measurement: {offset: 0.25}\n")
     assert main(words) == 2
     assert "there are several sensors; expected a value by channel" in capsys.readouterr().err
+    (tmp_path / "b.csv").write_bytes((folder / "b.csv").read_bytes())
     assert main([*words, "--no-measurement"]) == 0
     assert document(tmp_path / "out" / "comparison.json")["measurement"] == []
 
