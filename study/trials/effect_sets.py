@@ -10,13 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from study.compare.prediction import predict
+from study.compare.prediction import Prediction, predict
 from study.diagnose.candidates import FittedCandidate
+from study.diagnose.held_out import HeldOut, held_out, held_out_of
+from study.diagnose.verdict import Diagnosis
 from study.equations.model import ModelTerm
 from study.equations.terms import get
-from study.identify.time_domain.part_fit import fit_part, with_states
+from study.identify.time_domain.part_fit import fit_part, linearise, with_states
 from study.identify.time_domain.shape_search import Baseline, baseline, explained_by, sensitivity
+from study.identify.time_domain.weighted_fit import noise_left
 from study.records.record_layout import Layout
+from study.support import statistics
 from study.support.arrays import Floats
 from study.support.least_squares import length_or_one
 from study.trials.draw import Trial
@@ -35,7 +39,8 @@ class Truth:
     base: Baseline  # beside the coefficients that the believed model has
     added: Mapping[str, Floats]  # to the response by each hidden effect, beside these, shape (n s,)
     remainder: Mapping[str, Floats]  # the same of a force that nothing asked for has; empty without any
-    error: float  # that it leaves in what it was not fitted to
+    prediction: Prediction  # of what it was not fitted to
+    held_out: HeldOut  # what it leaves of both parts of the record
 
     def found(self, named: Sequence[ModelTerm], found_elsewhere: Collection[str] = ()) -> tuple[int, int]:
         """How many of some named effects are each there, and how many hidden ones they leave.
@@ -52,6 +57,24 @@ class Truth:
         rows, columns = linear_sum_assignment(weighted, maximize=True)
         met = [there[c] for r, c in zip(rows, columns, strict=True) if weighted[r, c] > 0.0]
         return len(met), sum(name not in met for name in hidden)
+
+    def behind(self, diagnosis: Diagnosis) -> float:
+        """Standard errors by which the true model leaves more than the best that a diagnosis has found.
+
+        As the diagnosis compares: on both parts of the record, white as what the best leaves. Zero where a fault that
+        was found has left other samples to judge.
+        """
+        rows = [*diagnosis.sets, *diagnosis.candidates]
+        found = [(row.held_out, row.fit) for row in rows] or [
+            (held_out_of(diagnosis.comparison), diagnosis.comparison.fit)
+        ]
+        best, fit = min(found, key=lambda one: float(np.mean(one[0].judged ** 2)))
+        if len(best.judged) != len(self.held_out.judged):
+            return 0.0
+        outputs, noise = self.prediction.prepared.outputs, noise_left(fit.residual, len(fit.outputs))
+        own, other = (np.concatenate(one.white(outputs, noise)) for one in (self.held_out, best))
+        count = min(len(own), len(other))
+        return statistics.worse(own[:count], other[:count])
 
     def same(self, entry: ModelTerm, name: str, alike: float = 0.98) -> bool:
         """Whether a named effect is one that is there, or correlates with it so much along this motion."""
@@ -77,7 +100,9 @@ def truth_of(trial: Trial) -> Truth:
         added[entry.name] = column - basis @ (basis.T @ column)
     hidden = {name: column for name, column in added.items() if name in trial.hidden}
     remainder = {name: column for name, column in added.items() if name not in hidden}
-    return Truth(replace(baseline(fit, prepared), basis=basis), hidden, remainder, predict(fit, prepared).error)
+    prediction = predict(fit, prepared)
+    left = held_out(fit, prediction, linearise(fit, prepared), prepared)
+    return Truth(replace(baseline(fit, prepared), basis=basis), hidden, remainder, prediction, left)
 
 
 def steady_ones(trial: Trial) -> tuple[str, ...]:

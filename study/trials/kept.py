@@ -66,9 +66,9 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
             (
                 "test", "seed", "hidden", "place", "share", "remainder", "remainder_error", "noise", "response",
                 "verdict", "named", "named_count", "there", "right", "sets", "holds", "faults_found", "error_before",
-                "error_after", "error_true", "noise_floor", "seconds", "trouble",
+                "error_after", "error_true", "true_behind", "noise_floor", "seconds", "trouble",
             ),
-            ("sets", "holds", "error_after", "error_true", "trouble"),
+            ("sets", "holds", "error_after", "error_true", "true_behind", "trouble"),
         ),
         CHANGES: KeptTable(
             (

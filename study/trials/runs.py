@@ -294,7 +294,7 @@ def _judged_rig(_: Order, trial: Trial) -> Row:
     right = (answer is not None and whole[0]) or (not trial.hidden and diagnosis.verdict == NOTHING)
     return row | {
         "there": 0 if answer is None else hits[0][0], "right": int(right), "holds": int(right or any(whole)),
-        "error_true": truth.error,
+        "error_true": truth.prediction.error, "true_behind": round(truth.behind(diagnosis), 2),
     }  # fmt: skip
 
 
