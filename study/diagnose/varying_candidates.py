@@ -24,6 +24,7 @@ from study.identify.time_domain.smoothness import with_curve
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
+from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.thresholds import ALPHA, PROMISING, TOLERANCE, K
 
@@ -48,28 +49,27 @@ def explains_more(changes: PromisedChanges, effects: Sequence[str]) -> bool:
 
     What the sensitivities promise of what others leave is seldom kept, and costs a search of its own where it is.
     """
-    prepared, entries = changes.prepared, list(changes.shares)
-    whole = predict(changes.fit, prepared)
-    for entry in entries:
-        found = _with(changes.fit, entry, prepared)
+    prepared, fit, entries = changes.prepared, changes.fit, list(changes.shares)
+    whole = predict(fit, prepared)
+    for found in side_by_side(lambda entry: _with(fit, entry, prepared), entries):
         if found is None:
             continue
         gain = statistics.gain(whole.residual, found.residual)
         less = whole.error**2 - found.error**2 > TOLERANCE**2
         if less and gain.p_value * len(entries) < ALPHA:
             return True
-    for name in effects:
-        model, held = changes.fit.model.without_term(name), changes.fit.held
+
+    def stands_for(name: str) -> bool:
+        model = fit.model.without_term(name)
+        held = [key for key in fit.held if key in model.values]
         try:
-            fewer = fit_part(
-                model, prepared, [k for k in held if k in model.values], steps=changes.fit.steps_per_sample
-            )
+            fewer = fit_part(model, prepared, held, steps=fit.steps_per_sample)
         except StudyError:
-            continue
+            return False
         found = _with(fewer, entries[0], prepared)
-        if found is not None and statistics.worse(found.residual, whole.residual) < K:
-            return True
-    return False
+        return found is not None and statistics.worse(found.residual, whole.residual) < K
+
+    return any(side_by_side(stands_for, effects))
 
 
 def _with(fit: FreeRunFit, entry: ModelTerm, prepared: Prepared) -> Prediction | None:
