@@ -12,6 +12,7 @@ from matplotlib.ticker import LogLocator
 
 from study.compare.history import label
 from study.figures import page
+from study.figures.labels import term_names
 from study.figures.styles import in_style
 from study.support.terminal import on_a_line
 
@@ -27,7 +28,7 @@ def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     axes.set_yscale("log", subs=[])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    names = [label(s).replace("_", " ") for s in steps]
+    names = [term_names(label(s)) for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
     axes.set_ylabel("held-out error (%)")
     axes.margins(x=0.08)

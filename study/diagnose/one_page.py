@@ -93,7 +93,7 @@ def equation_in_symbols(model: Model, free: bool = False) -> str:
     Of a structure its terms with their places, which have no room for formulas.
     """
     if model.named:
-        return ", ".join(entry.name.replace("_", " ") for entry in model.terms)
+        return ", ".join(term_names(entry.name) for entry in model.terms)
     terms = [
         f"{' , '.join(t.symbols)} {_in_brackets(t.term.formula.replace('d2u/dt2', 'd^2u/dt^2'))}" for t in model.terms
     ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from study.figures.labels import term_names
 from study.records.readers.options import options_beside, read_options
 from study.support.arrays import Bools, Floats
 from study.support.errors import at, expect
@@ -71,7 +72,7 @@ def fault_fields(fault: Fault) -> dict[str, Any]:
 
 def _what_follows(fault: Fault) -> str:
     if fault.rivals:
-        effects = " or ".join(name.replace("_", " ") for name in fault.rivals)
+        effects = " or ".join(map(term_names, fault.rivals))
         if fault.channel == "force":
             return f"; {effects} may be no more than that: look at the instruments first. Nothing is corrected"
         return f"; {effects} would do as much, and this record cannot tell them apart: nothing is corrected"

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field
 
 from study.compare import history
 from study.diagnose import MISSING, NOTHING
+from study.figures.labels import term_names
 from study.support import document
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
@@ -211,7 +212,7 @@ def published_and_found(entry: Entry) -> list[Block]:
 
 def of_record(found: RecordFindings, named: bool) -> list[Block]:
     """The ladder of one record: from the model as given to the one reached, and what is left of the response."""
-    begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
+    begins = ", ".join(term_names(name) for name in found.steps[0]["terms"])
     name = f"**`{found.record}`.** " if named else ""
     return [
         document.Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
@@ -223,7 +224,7 @@ def of_record(found: RecordFindings, named: bool) -> list[Block]:
 def climb_block(found: RecordFindings) -> Block:
     """Every model of the climb with its held-out error."""
     rows = [
-        ("as given" if number == 0 else _spoken(history.label(step)), percent(step["error"]["response"]),
+        ("as given" if number == 0 else term_names(history.label(step)), percent(step["error"]["response"]),
          f"{step['rms']:.3g} {step['unit']}" if step["unit"] else "", percent(step["noise_floor"]["response"]))
         for number, step in enumerate(found.steps)
     ]  # fmt: skip
@@ -301,14 +302,10 @@ def _number(value: float, unit: str) -> str:
 def _effect(candidate: Fields | str) -> str:
     """An effect, in a structure with its place."""
     if isinstance(candidate, str):
-        return _spoken(candidate)
+        return term_names(candidate)
     place = " and ".join(candidate.get("between", ()))
     where = f" between {place}" if place else f" at {candidate['at']}" if "at" in candidate else ""
-    return _spoken(candidate["term"]) + where
-
-
-def _spoken(name: str) -> str:
-    return name.replace("_", " ")
+    return term_names(candidate["term"]) + where
 
 
 # ---- pages
@@ -336,7 +333,7 @@ def climb_overview(shown: Sequence[Entry]) -> Block:
 def _added(found: RecordFindings) -> str:
     names = [s["added"] for s in found.steps if s.get("added")]
     gone = {s["dropped"] for s in found.steps if s.get("dropped")}
-    return ", ".join(n.replace("_", " ") + (" (taken out again)" if n in gone else "") for n in names) or "nothing"
+    return ", ".join(term_names(n) + (" (taken out again)" if n in gone else "") for n in names) or "nothing"
 
 
 def _section(entry: Entry) -> PageSection:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from study.figures.labels import term_names
 from study.figures.page import frame_cells
 
 STEPS_OF_ADDING = {
@@ -23,8 +24,8 @@ def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
     ``counts`` are as ``reach.confusion`` gives them.
     """
     table = counts.set_index("hidden")
-    names = [str(name).replace("_", " ") for name in table.columns]
-    hidden = [str(name).replace("_", " ") for name in table.index]
+    names = [term_names(str(name)) for name in table.columns]
+    hidden = [term_names(str(name)) for name in table.index]
     numbers = table.to_numpy(dtype=np.float64)
     share = numbers / np.maximum(numbers.sum(axis=1, keepdims=True), 1.0)
     axes.imshow(share, cmap="Greys", vmin=0.0, vmax=1.0, aspect="auto")
