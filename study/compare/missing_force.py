@@ -66,6 +66,11 @@ class MissingForce:
         """The samples that filters and integrals leave sure."""
         return slice(self.edge, len(self.force) - self.edge)
 
+    @property
+    def known(self) -> tuple[Floats, Floats, Floats]:
+        """Displacement, velocity and missing force on these samples."""
+        return self.displacement[self.inner], self.velocity[self.inner], self.force[self.inner]
+
     def weighted(self, force: Floats) -> Floats:
         """A force as it shows in the response, in the bands that stand above the noise, shape (n,)."""
         return _filtered(force, self.dt, self.frequency, self.weight * self.gate)

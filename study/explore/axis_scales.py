@@ -48,7 +48,7 @@ class Focus:
     @cached_property
     def within(self) -> tuple[Floats, Floats, Floats]:
         """Displacement, velocity and missing force at the place where these are known, without the record's ends."""
-        return within(self.lacking)
+        return self.lacking.known
 
     @cached_property
     def response(self) -> Scale:
@@ -79,12 +79,6 @@ class Focus:
     @property
     def _unit(self) -> str:
         return self.comparison.record.unit(self.sensor.sensor)
-
-
-def within(lacking: MissingForce) -> tuple[Floats, Floats, Floats]:
-    """Displacement, velocity and missing force where these are known, without the ends of the record."""
-    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    return u, v, force
 
 
 def _largest(values: Floats) -> float:

@@ -16,7 +16,8 @@ from study.compare.comparison import Comparison, across_records, compare, on_eac
 from study.compare.comparison_report import history_step
 from study.compare.each_record import Separate
 from study.compare.fitted_coefficients import Level
-from study.compare.missing_force import Unbalanced, unbalanced
+from study.compare.force_map import ForceCurve, cells_of, curve, surface
+from study.compare.missing_force import unbalanced
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import FittedCandidate, Progress
@@ -36,6 +37,7 @@ from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.record_layout import records_judged
 from study.records.sampling_rate import without_spare_samples
+from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.extras import undrawn
 
@@ -65,6 +67,15 @@ class ByRecord:
 NO_OTHERS = Several()
 
 
+@dataclass(frozen=True, eq=False)
+class StillMissing:
+    """The force that would still be missing at a place with a candidate in the model: what is shown of it."""
+
+    against_displacement: ForceCurve
+    against_velocity: ForceCurve
+    plane: Floats  # mean force in the cells of the map that is shown, shape (cells, cells)
+
+
 @dataclass(frozen=True)
 class Stage:
     """A model and what was found of it."""
@@ -75,8 +86,10 @@ class Stage:
     accounted: Accounted  # the comparison, and the faults that its record is corrected for
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
-    # what the equations would leave on each record with a candidate in the model, by its name
-    would: Mapping[str, tuple[Unbalanced, ...]] = field(default_factory=dict[str, tuple[Unbalanced, ...]])
+    # what each candidate would leave, by its name, on each record at each place, by its label
+    would: Mapping[str, tuple[Mapping[str, StillMissing], ...]] = field(
+        default_factory=dict[str, tuple[Mapping[str, "StillMissing"], ...]]
+    )
     dropped: str | None = None  # the term that was taken out of the model before
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
     on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
@@ -289,19 +302,29 @@ def with_next_test(stage: Stage) -> Stage:
 
 def _foreseen(stage: Stage) -> Stage:
     """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
-    would = dict(stage.would)
-    for row in stage.shown:
-        if row.name not in would:
-            would[row.name] = tuple(_left_with(row, c) for c in stage.on_each or (stage.comparison,))
-    return replace(stage, would=would)
+    rows = [row for row in stage.shown if row.name not in stage.would]
+    on_each = [_still_missing(rows, comparison) for comparison in stage.on_each or (stage.comparison,)]
+    return replace(
+        stage, would={**stage.would, **dict(zip((r.name for r in rows), zip(*on_each, strict=True), strict=True))}
+    )
 
 
-def _left_with(row: Ranked, comparison: Comparison) -> Unbalanced:
-    """What the equations leave on a record with a candidate in the model; what they leave without if it cannot run."""
-    try:
-        return unbalanced(row.fit.model, (), row.prediction.along(comparison.prepared))
-    except StudyError:
-        return comparison.missing
+def _still_missing(rows: Sequence[Ranked], comparison: Comparison) -> list[dict[str, StillMissing]]:
+    """The force that each of these candidates leaves on a record, at every place where one that is missing shows."""
+    places = comparison.missing.shown
+    cells = [cells_of(*comparison.missing.at(place).known[:2]) for place in places]
+    found: list[dict[str, StillMissing]] = []
+    for row in rows:
+        try:
+            left = unbalanced(row.fit.model, (), row.prediction.along(comparison.prepared))
+        except StudyError:
+            left = comparison.missing
+        known = [left.at(place).known for place in places]
+        found.append({
+            place.label: StillMissing(curve(u, force), curve(v, force), surface(u, v, force, count).mean)
+            for place, (u, v, force), count in zip(places, known, cells, strict=True)
+        })  # fmt: skip
+    return found
 
 
 def with_stage(session: Session, stage: Stage) -> Session:

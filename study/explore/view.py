@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study.compare import history
 from study.compare.comparison import Comparison
 from study.compare.connection_spectra import DynamicStiffness, dynamic_stiffnesses
-from study.compare.force_map import CLASSES, cells_of, curve, surface
+from study.compare.force_map import CLASSES, curve, surface
 from study.compare.links import power_in_blocks, times_of_blocks, visits_in_blocks
 from study.compare.noise import segments_of
 from study.compare.place_sketch import sketch_of
@@ -24,7 +24,7 @@ from study.diagnose.ranked import Ranked
 from study.equations.coefficient_units import units_at
 from study.equations.place import HERE, Place
 from study.explore import axes, check_columns, decimate, place_words, record_words, words
-from study.explore.axis_scales import LEAST_FORCE, Columns, Focus, heard, rms_force, within
+from study.explore.axis_scales import LEAST_FORCE, Columns, Focus, heard, rms_force
 from study.explore.check_columns import NINETY_FIVE
 from study.explore.page_units import in_text, power
 from study.explore.session import Session, Stage, on_record
@@ -359,14 +359,13 @@ def _by_block(table: NDArray[Any]) -> NDArray[Any]:
 
 def _would_lack(focus: Focus, stage: Stage) -> dict[str, Columns]:
     """The force that would still be missing with each candidate in the model: its curves and its map."""
-    lacking = [within(stage.would[row.name][0].at(focus.place)) for row in stage.shown]
-    cells = cells_of(*focus.within[:2])  # those of the map that is shown
+    lacking = [stage.would[row.name][0][focus.place.label] for row in stage.shown]
     u, v, f = focus.displacement.factor, focus.velocity.factor, focus.force.factor
-    maps = {str(i): surface(*found, cells).mean.ravel() / f for i, found in enumerate(lacking)}
+    maps = {str(i): found.plane.ravel() / f for i, found in enumerate(lacking)}
     curves: dict[str, Columns] = {"would_u": {}, "would_v": {}}
     for i, found in enumerate(lacking):
-        for source, along, scale in zip(curves, found, (u, v), strict=False):
-            line = curve(along, found[2])
+        lines = found.against_displacement, found.against_velocity
+        for source, line, scale in zip(curves, lines, (u, v), strict=True):
             for name, column in ((f"at{i}", line.at / scale), (f"y{i}", line.mean / f)):  # all of one length
                 curves[source][name] = np.pad(column, (0, CLASSES - len(column)), constant_values=np.nan)
     return {**curves, "would_plane": maps}
