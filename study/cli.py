@@ -1,5 +1,6 @@
 """The command line: run a command, and turn whatever goes wrong into one sentence."""
 
+import ctypes
 import gc
 import os
 import re
@@ -14,6 +15,7 @@ from study.support.extras import lacked
 from study.support.terminal import harmless, shown_on
 
 LONG_WORD = re.compile(r"\S{400,}")  # that no path and no value needs: a message is to be read
+M_ARENA_MAX = -8  # of malloc.h
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
 
@@ -60,6 +62,7 @@ def _run(argv: Sequence[str] | None) -> None:
     if argv is None:
         # what modules make while they load lives to the end: a search for garbage finds none there
         gc.set_threshold(50_000, 20, 50)
+        _share_one_heap()
     words = sys.argv[1:] if argv is None else argv
     for word in words:  # a shell cannot pass one on, a caller in Python can
         expect("\0" not in word, f"the word {word!r} holds a null byte; expected words without")
@@ -68,6 +71,12 @@ def _run(argv: Sequence[str] | None) -> None:
     except SystemExit:  # --help and --version have printed what was asked
         return
     arguments.run(arguments)
+
+
+def _share_one_heap() -> None:
+    """One heap for all threads: each would keep what the arrays of its last fits took, a sixth of a long diagnosis."""
+    with suppress(AttributeError, OSError, TypeError):  # the C library is another than GNU's, or not to be called
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 1)
 
 
 def _fault(error: Exception) -> int:
