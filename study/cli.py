@@ -15,7 +15,6 @@ from study.support.extras import lacked
 from study.support.terminal import harmless, shown_on
 
 LONG_WORD = re.compile(r"\S{400,}")  # that no path and no value needs: a message is to be read
-M_ARENA_MAX = -8  # of malloc.h
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
 
@@ -76,7 +75,7 @@ def _run(argv: Sequence[str] | None) -> None:
 def _share_one_heap() -> None:
     """One heap for all threads: each would keep what the arrays of its last fits took, a sixth of a long diagnosis."""
     with suppress(AttributeError, OSError, TypeError):  # the C library is another than GNU's, or not to be called
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 1)
+        ctypes.CDLL(None).mallopt(-8, 1)  # M_ARENA_MAX of malloc.h
 
 
 def _fault(error: Exception) -> int:
