@@ -7,6 +7,7 @@ The first part of the record says how much of each, the second how much of the r
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -18,7 +19,7 @@ from study.equations.model import ModelTerm
 from study.equations.place import Place
 from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import judging_run, run_of, with_states
+from study.identify.time_domain.part_fit import BEYOND_MEASURE, judging_run, run_of, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline, baseline, modulation_lines, residual_lines
 from study.records.prepared import Prepared
@@ -91,9 +92,10 @@ def unexplained(base: Baseline) -> Unexplained:
     shaped = _with_shapes(fit, [text for texts in exact.values() for text in texts])
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
     joined = bool(prepared.record.stretches)
-    try:
+    slopes = None
+    with suppress(DivergenceError):
         slopes = with_states(shaped, prepared)
-    except DivergenceError:  # what shapes add may leave the range of numbers where the motion does not
+    if slopes is None or not np.all(np.abs(slopes) < BEYOND_MEASURE):  # what shapes add, where the motion is finite
         exact, shaped, slopes = {}, fit, with_states(fit, prepared)
     states = 0 if fit.restarts or joined else slopes.shape[1] - len(shaped.keys)
     rows = [free, fit.residual, _columns(slopes, len(shaped.keys), states, joined)]
