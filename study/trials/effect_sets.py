@@ -5,6 +5,7 @@ response is what that adds, beside all that the believed model's own coefficient
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from study.identify.time_domain.weighted_fit import noise_left
 from study.records.record_layout import Layout
 from study.support import statistics
 from study.support.arrays import Floats
+from study.support.errors import StudyError
 from study.support.least_squares import length_or_one
 from study.trials.draw import Trial
 from study.way_in.compare_records import made_ready
@@ -40,7 +42,7 @@ class Truth:
     added: Mapping[str, Floats]  # to the response by each hidden effect, beside these, shape (n s,)
     remainder: Mapping[str, Floats]  # the same of a force that nothing asked for has; empty without any
     prediction: Prediction  # of what it was not fitted to
-    held_out: HeldOut  # what it leaves of both parts of the record
+    held_out: HeldOut  # what the hidden effects leave of both parts of the record, fitted without the remainder
 
     def found(self, named: Sequence[ModelTerm], found_elsewhere: Collection[str] = ()) -> tuple[int, int]:
         """How many of some named effects are each there, and how many hidden ones they leave.
@@ -59,7 +61,7 @@ class Truth:
         return len(met), sum(name not in met for name in hidden)
 
     def behind(self, diagnosis: Diagnosis) -> float:
-        """Standard errors by which the true model leaves more than the best that a diagnosis has found.
+        """Standard errors by which the true set leaves more than the best that a diagnosis has found.
 
         As the diagnosis compares: on both parts of the record, white as what the best leaves. Zero where a fault that
         was found has left other samples to judge.
@@ -100,9 +102,14 @@ def truth_of(trial: Trial) -> Truth:
         added[entry.name] = column - basis @ (basis.T @ column)
     hidden = {name: column for name, column in added.items() if name in trial.hidden}
     remainder = {name: column for name, column in added.items() if name not in hidden}
-    prediction = predict(fit, prepared)
-    left = held_out(fit, prediction, linearise(fit, prepared), prepared)
-    return Truth(replace(baseline(fit, prepared), basis=basis), hidden, remainder, prediction, left)
+    prediction, left = predict(fit, prepared), fit
+    if remainder:  # which nothing that is asked for has
+        alone = replace(fit.model, terms=tuple(entry for entry in fit.model.terms if entry.name not in remainder))
+        known = [key for key in fit.held if key in alone.values]
+        with suppress(StudyError):
+            left = fit_part(alone, prepared, known, steps=fit.steps_per_sample, max_iterations=30)
+    held = held_out(left, predict(left, prepared), linearise(left, prepared), prepared)
+    return Truth(replace(baseline(fit, prepared), basis=basis), hidden, remainder, prediction, held)
 
 
 def steady_ones(trial: Trial) -> tuple[str, ...]:

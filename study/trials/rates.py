@@ -17,6 +17,7 @@ from scipy.special import ndtri
 from study.diagnose.next_test import WORTH
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
+from study.support.thresholds import K
 from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, CHANGES, LIKE_RIGS, NEXT_TESTS, STRUCTURES, TRIALS, Row, rows_of
@@ -209,6 +210,11 @@ def _effects(*counts: int) -> Member:
     return lambda row: row["hidden"] != "" and (row["hidden"] != NO_EFFECT) * (row["hidden"].count("+") + 1) in counts
 
 
+def _level_with_truth(row: Row) -> bool:
+    """Effects are hidden, and the true set leaves no more than the best that was found; asked of failed trials too."""
+    return _effects(1, 2, 3, 4)(row) and not row["true_behind"] >= K
+
+
 def _of_kinds(*tests: str) -> Member:
     """Trials of changes of these kinds."""
     return lambda row: row["test"] in tests
@@ -286,8 +292,11 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   asked="named_count"),
             Reach("nothing named where nothing is missing", _effects(0), lambda r: r["named"] == "", "nothing"),
             Reach("the true set in the list of those that the record cannot tell apart", _effects(1, 2, 3, 4),
-                  _is("holds"), "holds"),
+                  _is("holds")),
             Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
+            Reach("... where the record cannot tell it from the best", _level_with_truth, _is("holds")),
+            Reach("... and a set is named", lambda r: _level_with_truth(r) and r["named"] != "", _is("holds"), "holds"),
+            Reach("diagnosed within 60 s of one core", _effects(0, 1, 2, 3, 4), lambda r: r["seconds"] <= 60.0),
         ),
         CHANGES: (
             Reach("what is missing named rightly, where a coefficient changes", _of_kinds(*_CHANGING), _is("right"),

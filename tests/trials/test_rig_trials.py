@@ -6,12 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.diagnose.confirmed_faults import diagnose_accounted
+from study.diagnose.held_out import held_out_of
 from study.equations.model import free
 from study.equations.place import Place
-from study.equations.terms import get
+from study.equations.terms import LIBRARY, get
 from study.support.errors import StudyError
+from study.support.thresholds import K
 from study.trials import make_trial, rates
 from study.trials.effect_sets import Truth, truth_of
+from study.trials.findings import compared
 from study.trials.kept import KEPT_TABLES, LIKE_RIGS
 from study.trials.rigs import ALIKE, RANGES, RIG_KINDS, RIG_NOISES
 from study.trials.runs import rig_orders, run_trial
@@ -112,11 +116,52 @@ def test_a_row_has_the_columns_of_its_table() -> None:
     assert row["error_true"] < row["error_before"]
 
 
+def test_how_far_the_true_set_is_behind_the_best() -> None:
+    trial = make_trial(2, ("cubic_stiffness",), RIG_NOISES[0], test="rig_component")
+    truth, offered = truth_of(trial), ("cubic_stiffness", "quadratic_damping")
+    begun = compared(trial, trial.believed)
+    found = diagnose_accounted(begun, without=[name for name in LIBRARY if name not in offered]).diagnosis
+    assert found.answer is not None
+    assert found.answer.names == trial.hidden
+    assert abs(truth.behind(found)) < K
+    assert truth.behind(replace(found, sets=(), candidates=())) < 0.0, "the model as given leaves more"
+    astray = replace(truth, held_out=held_out_of(found.comparison))
+    assert astray.behind(found) > K
+
+
+def test_the_true_set_is_held_against_the_best_without_the_remainder() -> None:
+    for seed in range(1, 20):
+        trial = make_trial(seed, ("cubic_stiffness",), RIG_NOISES[0], test="rig_component")
+        if "remainder" in trial.about:
+            break
+    truth = truth_of(trial)
+    assert truth.remainder
+    assert np.std(truth.held_out.judged) > 1.1 * np.std(truth.prediction.residual)
+
+
 def test_rates_are_of_what_they_say() -> None:
     rows = [
-        {"hidden": "a+b", "named": "a+b", "named_count": 2, "there": 2, "right": 1, "holds": 1},
-        {"hidden": "a+b", "named": "a", "named_count": 1, "there": 1, "right": 0, "holds": 0, "remainder": "x"},
-        {"hidden": "a+b+c", "named": "a+d", "named_count": 2, "there": 1, "right": 0, "holds": 1},
+        {
+            "hidden": "a+b",
+            "named": "a+b",
+            "named_count": 2,
+            "there": 2,
+            "right": 1,
+            "holds": 1,
+            "true_behind": 0.0,
+            "seconds": 60.0,
+        },
+        {
+            "hidden": "a+b",
+            "named": "a",
+            "named_count": 1,
+            "there": 1,
+            "right": 0,
+            "holds": 0,
+            "remainder": "x",
+            "true_behind": 1.1 * K,
+        },
+        {"hidden": "a+b+c", "named": "a+d", "named_count": 2, "there": 1, "right": 0, "holds": 1, "true_behind": -K},
         {"hidden": "none", "named": "", "named_count": 0, "there": 0, "right": 1, "holds": 1},
         {"hidden": "none", "named": "a", "named_count": 1, "there": 0, "right": 0, "holds": 0},
         {"hidden": "a+b", "trouble": "not diagnosed"},
@@ -132,6 +177,9 @@ def test_rates_are_of_what_they_say() -> None:
         "nothing named where nothing is missing": (2, 0.5),
         "the true set in the list of those that the record cannot tell apart": (4, 0.5),
         "... beside a remainder": (1, 0.0),
+        "... where the record cannot tell it from the best": (3, pytest.approx(2 / 3)),
+        "... and a set is named": (2, 1.0),
+        "diagnosed within 60 s of one core": (6, pytest.approx(1 / 6)),
     }
 
 
