@@ -1,6 +1,7 @@
 """Trials like real rigs: what is drawn, how large each effect is, and how sets are scored."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,10 +17,12 @@ from study.support.thresholds import K
 from study.trials import make_trial, rates
 from study.trials.effect_sets import Truth, truth_of
 from study.trials.findings import compared
-from study.trials.kept import KEPT_TABLES, LIKE_RIGS
+from study.trials.kept import KEPT_TABLES, LIKE_RIGS, differing_trials
 from study.trials.rigs import ALIKE, RANGES, RIG_KINDS, RIG_NOISES
 from study.trials.runs import rig_orders, run_trial
 from study.way_in.compare_records import compare_records
+
+KEPT = Path(__file__).parents[2] / "docs" / "trials_like_rigs.csv"
 
 
 def test_there_are_as_many_as_were_asked_for_and_a_fifth_are_structures() -> None:
@@ -114,6 +117,20 @@ def test_a_row_has_the_columns_of_its_table() -> None:
     assert tuple(row) == KEPT_TABLES[LIKE_RIGS].columns
     assert row["trouble"] == ""
     assert row["error_true"] < row["error_before"]
+
+
+def test_the_kept_table_is_of_these_trials() -> None:
+    kept = pd.read_csv(KEPT)
+    assert tuple(kept.columns) == KEPT_TABLES[LIKE_RIGS].columns
+    assert list(zip(kept["test"], kept["seed"], strict=True)) == [(order.test, order.seed) for order in rig_orders()]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [780005, 780006, 780007])
+def test_a_row_of_the_kept_table_comes_out_again(seed: int, tmp_path: Path) -> None:
+    order = next(order for order in rig_orders() if order.seed == seed)
+    pd.DataFrame([run_trial(order)]).to_csv(tmp_path / "own.csv", index=False)
+    assert differing_trials(pd.read_csv(tmp_path / "own.csv"), pd.read_csv(KEPT), LIKE_RIGS) == []
 
 
 def test_how_far_the_true_set_is_behind_the_best() -> None:
