@@ -292,10 +292,10 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   asked="named_count"),
             Reach("nothing named where nothing is missing", _effects(0), lambda r: r["named"] == "", "nothing"),
             Reach("the true set in the list of those that the record cannot tell apart", _effects(1, 2, 3, 4),
-                  _is("holds")),
+                  _is("holds"), "holds"),
             Reach("... beside a remainder", lambda r: r["remainder"] != "", _is("holds")),
             Reach("... where the record cannot tell it from the best", _level_with_truth, _is("holds")),
-            Reach("... and a set is named", lambda r: _level_with_truth(r) and r["named"] != "", _is("holds"), "holds"),
+            Reach("... and a set is named", lambda r: _level_with_truth(r) and r["named"] != "", _is("holds")),
             Reach("diagnosed within 60 s of one core", _effects(0, 1, 2, 3, 4), lambda r: r["seconds"] <= 60.0),
         ),
         CHANGES: (
