@@ -304,9 +304,8 @@ def _foreseen(stage: Stage) -> Stage:
     """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
     rows = [row for row in stage.shown if row.name not in stage.would]
     on_each = [_still_missing(rows, comparison) for comparison in stage.on_each or (stage.comparison,)]
-    return replace(
-        stage, would={**stage.would, **dict(zip((r.name for r in rows), zip(*on_each, strict=True), strict=True))}
-    )
+    would = {row.name: each for row, each in zip(rows, zip(*on_each, strict=True), strict=True)}
+    return replace(stage, would={**stage.would, **would})
 
 
 def _still_missing(rows: Sequence[Ranked], comparison: Comparison) -> list[dict[str, StillMissing]]:
