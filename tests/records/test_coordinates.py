@@ -194,3 +194,12 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again[name], values)
     assert {name: again.unit(name) for name in channels} == units
     assert replace(again, units={}).unit("floor1 displacement") == "m"
+
+
+def test_read_without_their_model_it_is_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path, PLAIN)
+    with pytest.raises(StudyError, match="'floor1 displacement' is known to a model with coordinates"):
+        read_record(path)
+    with pytest.raises(StudyError) as said:
+        read_record(written(tmp_path, {"time": TIME, "load": SHAKER, "x1": FIRST}, "single.csv"))
+    assert "coordinates" not in str(said.value)

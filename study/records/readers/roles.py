@@ -228,7 +228,9 @@ def _ask(path: Path, table: Table, roles: Roles, problem: str) -> StudyError:
     groups = groups_in(column.name for column in table.columns)
     choose = f" and choose --group {groups[0]} or {groups[1]}" if len(groups) > 1 else ""
     wanted = " ".join(f"--column {channel}=NAME" for channel in (*roles.forces[:1], _motion_of(roles)))
+    of_places = [c.name for c in table.columns if roles.alone and c.name.lower().split()[1:] in ([m] for m in MOTIONS)]
+    places = f"; {of_places[0]!r} is known to a model with coordinates: st.read(path, model=model)" if of_places else ""
     return StudyError(
         f"{path}: {problem}; the columns are {table.listing()}: name them by {wanted}{choose}, or in "
-        f"{path.stem}{OPTIONS_SUFFIX}"
+        f"{path.stem}{OPTIONS_SUFFIX}{places}"
     )
