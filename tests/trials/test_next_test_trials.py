@@ -1,14 +1,17 @@
 """Trials of the test that is proposed after a tie."""
 
 from collections import Counter
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from study.trials.kept import KEPT_TABLES, NEXT_TESTS
+from study.trials.kept import KEPT_TABLES, NEXT_TESTS, differing_trials
 from study.trials.pages import blocks
 from study.trials.rates import target_summary
 from study.trials.runs import PLANNED, next_test_orders, run_trial, table_of
+
+KEPT = Path(__file__).parents[2] / "docs" / f"{NEXT_TESTS}.csv"
 
 
 def test_each_damper_is_hidden_as_often_in_each_test():
@@ -54,3 +57,17 @@ def test_a_tie_on_a_shake_table_ends_in_the_right_effect():
     assert found["trouble"] == ""
     assert found["promise"] > 0.8
     assert found["decided"] == 1.0
+
+
+def test_the_kept_table_is_that_of_the_orders() -> None:
+    kept = pd.read_csv(KEPT)
+    assert tuple(kept.columns) == KEPT_TABLES[NEXT_TESTS].columns
+    assert list(zip(kept["test"], kept["seed"], strict=True)) == [(o.test, o.seed) for o in next_test_orders()]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [640_014, 640_017])
+def test_a_row_of_the_kept_table_comes_out_again(seed: int, tmp_path: Path) -> None:
+    order = next(order for order in next_test_orders() if order.seed == seed)
+    pd.DataFrame([run_trial(order)]).to_csv(tmp_path / "own.csv", index=False)
+    assert differing_trials(pd.read_csv(tmp_path / "own.csv"), pd.read_csv(KEPT), NEXT_TESTS) == []
