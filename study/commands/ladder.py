@@ -12,9 +12,10 @@ from study.commands.parser import parser
 from study.commands.record_arguments import layout_of, read_records
 from study.compare.comparison import compared_fit
 from study.compare.prediction import predict
-from study.equations.model import free
+from study.equations.model import ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
+from study.equations.variation import Variation, varying
 from study.faults.fault import FAULTS, settings_of
 from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import Prepared
@@ -30,7 +31,7 @@ class Ladder(TableRow):
     """A row of ``config/ladders.tsv``."""
 
     record: Text  # of ``config/measurements.tsv``
-    terms: Words  # that are added, one by one
+    terms: Words  # that are added, one by one; ``TERM:CHANNEL:SIDE`` of one that varies with a channel, on one side
     fit: str  # samples that are fitted, in the words of the command line, where a part of those of the row is enough
     faults: Words  # of the measurement, that are looked for and corrected
     published: Text  # what the literature reaches or knows
@@ -44,8 +45,8 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
             known = ", ".join(measurements)
             expect(row.record in measurements, f"{row.record!r} is no record of measurements.tsv; known are {known}")
             expect(row.record not in found, "the record stands twice; expected each once")
-            for name in row.terms:
-                get(name)
+            for words in row.terms:
+                _entry(words)
             settings_of(dict.fromkeys(row.faults))
         found[row.record] = row
     return found
@@ -67,12 +68,10 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     settings = settings_of({name: None for name in FAULTS if name not in ladder.faults})
     prepared: Prepared | None = None
     for step in range(len(ladder.terms) + 1):
+        about = {"record": row.record, "title": title, "step": step, "added": "", "published": ladder.published}
         if step:
-            model = model.with_term(free(get(ladder.terms[step - 1])))
-        about = {
-            "record": row.record, "title": title, "step": step,
-            "added": ladder.terms[step - 1] if step else "", "published": ladder.published,
-        }  # fmt: skip
+            entry = _entry(ladder.terms[step - 1])
+            model, about["added"] = model.with_term(entry), entry.name
         try:
             if prepared is None:
                 first = compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
@@ -88,6 +87,14 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             "unit": prepared.record.units.get(str(worst.sensor), ""), "floor": prediction.floor, "note": "",
         })  # fmt: skip
     return pd.DataFrame(rows, columns=LADDER_COLUMNS)
+
+
+def _entry(words: str) -> ModelTerm:
+    """``coulomb_friction``, or ``coulomb_friction:band1_force:v<0``: friction that follows a channel while v < 0."""
+    name, _, rest = words.partition(":")
+    channel, _, side = rest.partition(":")
+    side = f"{side[0]} {side[1:2]} {side[2:]}" if side else ""
+    return free(varying(Variation(get(name), channel, side=side)) if channel else get(name))
 
 
 def missing_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:

@@ -93,6 +93,35 @@ RECORDS: Mapping[str, PublicRecord] = {
             PublicFile("model_2.csv", 270077, "f2380cbe94be5b9bad023fe75c1bda134d8aa64dc18a549fce63b4298530ca73"),
         ),
     ),
+    "axis": PublicRecord(
+        "Positioning axis", "A. Janot, M. Gautier, M. Brunot, 2019", "Apache-2.0", BENCHMARKS,
+        (
+            PublicFile(
+                "position_control.csv", 959969, "8de108ed7706fbaa8af1b223eabfd91e02c5f7aaa162da0d15c32d3f67864a75"
+            ),
+        ),
+    ),
+    "roll": PublicRecord(
+        "Ship in roll", "M. Alexandersson, 2020", "MIT", "the repository of M. Alexandersson",
+        (PublicFile("decay_0_knots.csv", 179814, "491b8160acd77d907fab1bf87bae13d549476ca193af75e23c7b8c3784a77bd5"),),
+    ),
+    "friction_damper": PublicRecord(
+        "Band brake", "ARTS-Laboratory", "CC BY-SA 4.0",
+        "the repository of ARTS-Laboratory, banded rotary friction device",
+        (
+            PublicFile(
+                "harmonic0.015forward.csv", 228956, "39a83eeb9890016fd381b7d174f659507d6dcd1684400d03d29d5f38f9b88bcd"
+            ),
+            PublicFile(
+                "step0.015forward.csv", 228378, "6e3d6995d0422a141cafa0f8c89c5e4dc1dc44355e8ca1280424f5fb1b5ffe47"
+            ),
+        ),
+    ),
+    "movable_support": PublicRecord(
+        "Beam on a moving support", "DROPBEAR, High-Rate SHM working group", "CC BY-SA 4.0",
+        "the repository of the High-Rate SHM working group",
+        (PublicFile("ten_steps.csv", 469319, "94b8ee9f93bb905426a3d2c2ba0edf3af00d31a5f0ad55661a4910836dfbc250"),),
+    ),
 }  # fmt: skip
 
 
