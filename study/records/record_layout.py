@@ -283,7 +283,7 @@ def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int, *, a
     goes_on = "the free run of either part runs on through the other's"
     begins = "the free run starts again in each, from a fitted state"
     return (
-        f"every other block{of} is judged: {len(fit)} are fitted and {len(judge)} judged, of {length:.3g} s each on "
+        f"every other block{of} is judged: {len(fit)} fitted and {len(judge)} judged, of {length:.3g} s each on "
         f"average, and {begins if anew else goes_on}"
     )
 
