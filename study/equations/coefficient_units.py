@@ -12,7 +12,9 @@ def units_at(place: Place, record: Record) -> tuple[str, str]:
     """Units of force and displacement at a place, those of a completed record."""
     force, length = record.force_and_length
     ends = [end for end in place.ends if end != GROUND]
-    return (f"{force} {length}", "rad") if ends and record.rotations.issuperset(ends) else (force, length)
+    if not ends or not record.rotations.issuperset(ends):
+        return force, length
+    return (force if force.startswith("rad/") else f"{force} {length}"), "rad"  # a decay: its moment is over its inertia
 
 
 def coefficient_unit(entry: ModelTerm, symbol: str, record: Record) -> str:
@@ -23,6 +25,8 @@ def coefficient_unit(entry: ModelTerm, symbol: str, record: Record) -> str:
         power = 2 if turning == len(entry.place.ends) else 1 if turning else 0
         if (force, length) == ("N", "m"):
             return ("kg", "kg m", "kg m^2")[power]
+        if force == ("rad/s^2" if power == 2 else f"{length}/s^2"):
+            return ""  # of a decay: a share of itself
         return (f"{force} s^2/{length}", f"{force} s^2", f"{force} {length} s^2")[power]
     return entry.term.unit(own, *units_at(entry.place, record))
 

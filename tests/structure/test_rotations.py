@@ -13,7 +13,7 @@ from study.equations.place import Place
 from study.equations.terms import get
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
-from study.records.record import Sensor, record_of, write_csv
+from study.records.record import Record, Sensor, record_of, write_csv
 
 TURNS = record_of(
     0.01, {"shaker": np.zeros(9)}, {Sensor(c, "displacement"): np.zeros(9) for c in ("heave", "pitch")}
@@ -64,3 +64,14 @@ def test_a_record_tells_which_coordinates_turn(tmp_path, frame, quiet_frame, uni
     assert comparison.prediction.error < 1e-5
     assert "kg m^2" in said
     assert " N m" in said
+
+
+def test_a_turning_mass_that_decays_has_coefficients_per_inertia_and_no_metres():
+    """No force says a moment: its unit is that of the angular acceleration."""
+    time = 0.01 * np.arange(4000)
+    roll = 0.3 * np.exp(-0.02 * time) * np.cos(2.5 * time)
+    units = {"displacement": "rad", "force": "rad/s^2"}
+    record = Record(0.01, {"force": np.zeros(4000), "displacement": roll}, units, "roll")
+    entries = {name: free(get(name)) for name in ("inertia", "linear_stiffness", "cubic_stiffness", "coulomb_friction")}
+    found = {name: coefficient_unit(entry, entry.symbols[0], record) for name, entry in entries.items()}
+    assert list(found.values()) == ["", "1/s^2", "1/(rad^2 s^2)", "rad/s^2"]
