@@ -9,6 +9,7 @@ The first part of the record says how much of each, the second how much of the r
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
@@ -26,7 +27,7 @@ from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.records.spectra import StretchTransforms
 from study.support import statistics
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.statistics import Gain
@@ -66,11 +67,26 @@ class Unexplained:
         tiny = np.finfo(float).tiny
         return u / max(float(np.std(u)), tiny), v / max(float(np.std(v)), tiny)
 
+    @cached_property
+    def paths(self) -> Complexes:
+        """Responses of the linear system on the lines of the transforms, as :meth:`Baseline.paths` has them."""
+        return self.base.paths(self.transforms.size)
+
+    @cached_property
+    def own_amounts(self) -> Floats:
+        """What the model's own coefficients take of the residual of the fitting part, shape (p,)."""
+        return least_squares(self.own[: self.split], self.residual[: self.split], 1e-6)
+
+    @cached_property
+    def beside_own(self) -> Floats:
+        """Residual of the judging part beside what those coefficients, fitted to both parts, take of it."""
+        return (self.residual - self.own @ least_squares(self.own, self.residual, 1e-6))[self.split :]
+
     def passed(self, place: Place, forces: Sequence[Floats]) -> Floats:
         """Forces at a place, each shape (n,), passed through the linear system, shape (n s, forces)."""
         if not forces:  # a spectrum without a single line has no times: what is nothing explains nothing
             return np.zeros((len(self.residual), 1))
-        path = self.base.paths(self.transforms.size) @ np.array(place.direction(self.base.fit.model.coordinates))
+        path = self.paths @ np.array(place.direction(self.base.fit.model.coordinates))
         columns = self.transforms.passed(path, [self.transforms.lines(force) for force in forces])
         return self.base.prepared.outputs.stacked(columns)
 
@@ -193,13 +209,15 @@ def _families_at(place: Place, left: Unexplained) -> list[FamilyGain]:
 def _one_by_one(left: Unexplained, columns: Floats) -> list[Gain]:
     """What each column explains by itself beside the model's own (Frisch and Waugh, 1933: one regression for all)."""
     both = np.column_stack([left.residual, columns])
-    amounts = np.column_stack([least_squares(left.own[: left.split], x, 1e-6) for x in both[: left.split].T])
+    amounts = least_squares(left.own[: left.split], both[: left.split], 1e-6)
     freed = both - left.own @ amounts
     early, late = freed[: left.split], freed[left.split :]
     power = np.sum(early[:, 1:] ** 2, axis=0)
     each = early[:, 1:].T @ early[:, 0] / np.where(power > 0.0, power, np.inf)
-    before, beside_own, evenly = left.residual[left.split :], _beside_own(left), left.base.prepared.free
-    return [statistics.gain_beside(before, a * late[:, i], beside_own, evenly=evenly) for i, a in enumerate(each, 1)]
+    before, evenly = left.residual[left.split :], left.base.prepared.free
+    return [
+        statistics.gain_beside(before, a * late[:, i], left.beside_own, evenly=evenly) for i, a in enumerate(each, 1)
+    ]
 
 
 def _shapes(place: Place, left: Unexplained) -> dict[str, Floats]:
@@ -284,11 +302,6 @@ def _held_out(left: Unexplained, columns: Floats) -> Gain:
     design = np.hstack([left.own, columns])
     early, late = design[: left.split], design[left.split :]
     amounts = least_squares(early, left.residual[: left.split], 1e-6)
-    amounts[: left.own.shape[1]] -= least_squares(left.own[: left.split], left.residual[: left.split], 1e-6)
+    amounts[: left.own.shape[1]] -= left.own_amounts
     evenly = left.base.prepared.free  # of a decay: what a change explains lies in the loud blocks
-    return statistics.gain_beside(left.residual[left.split :], late @ amounts, _beside_own(left), evenly=evenly)
-
-
-def _beside_own(left: Unexplained) -> Floats:
-    """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take of it."""
-    return (left.residual - left.own @ least_squares(left.own, left.residual, 1e-6))[left.split :]
+    return statistics.gain_beside(left.residual[left.split :], late @ amounts, left.beside_own, evenly=evenly)

@@ -14,7 +14,7 @@ def units_at(place: Place, record: Record) -> tuple[str, str]:
     ends = [end for end in place.ends if end != GROUND]
     if not ends or not record.rotations.issuperset(ends):
         return force, length
-    return (force if force.startswith("rad/") else f"{force} {length}"), "rad"  # a decay: its moment is over its inertia
+    return (force if force.startswith("rad/") else f"{force} {length}"), "rad"  # a moment over the inertia
 
 
 def coefficient_unit(entry: ModelTerm, symbol: str, record: Record) -> str:
