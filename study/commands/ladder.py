@@ -12,6 +12,7 @@ from study.commands.parser import parser
 from study.commands.record_arguments import layout_of, read_records
 from study.compare.comparison import compared_fit
 from study.compare.prediction import predict
+from study.equations.laid_variations import with_laid_variations
 from study.equations.model import ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
@@ -77,7 +78,8 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
                 first = compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
                 prepared, prediction = first.prepared, first.prediction
             else:
-                prediction = predict(compared_fit(fit_model(model, prepared), prepared)[0], prepared)
+                fit = fit_model(with_laid_variations(model, prepared), prepared)
+                prediction = predict(compared_fit(fit, prepared)[0], prepared)
         except StudyError as error:
             rows.append({**about, "note": str(error)})
             continue

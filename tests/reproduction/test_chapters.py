@@ -184,11 +184,27 @@ def test_a_record_that_is_not_there_is_left_out_and_said_so(expected, monkeypatc
 def test_ladders_name_records_and_terms_that_there_are(tmp_path):
     rows = load_measurements(CONFIG)
     head = "record\tterms\tfit\tfaults\tpublished\n"
-    wrong = ("nobody\tcubic_stiffness\t\t", "silverbox\tno_term\t\t", "silverbox\tcubic_stiffness\t\tno_fault")
-    for row, named in zip(wrong, ("nobody", "no_term", "no_fault"), strict=True):
+    wrong = (
+        "nobody\tcubic_stiffness\t\t", "silverbox\tno_term\t\t", "silverbox\tcubic_stiffness\t\tno_fault",
+        "brake\tcoulomb_friction:band2_force:w>0\t\t",
+    )  # fmt: skip
+    for row, named in zip(wrong, ("nobody", "no_term", "no_fault", "w > 0"), strict=True):
         (tmp_path / "ladders.tsv").write_text(f"{head}{row}\tx\n")
         with pytest.raises(StudyError, match=named):
             load_ladders(tmp_path, rows)
+
+
+@needs("friction_damper")
+def test_a_ladder_may_add_friction_that_follows_a_channel_in_one_direction(monkeypatch):
+    from tests.public_records import DATA
+
+    monkeypatch.setenv("STUDY_DATA", str(DATA))
+    rows = load_measurements(CONFIG)
+    made = climbed_ladder(rows["brake"], load_ladders(CONFIG, rows)["brake"], "Band brake")
+    bands = ["coulomb_friction_forward_over_band2_force", "coulomb_friction_backward_over_band1_force"]
+    assert made["added"].tolist() == ["", *bands]
+    assert made["error"].tolist() == sorted(made["error"], reverse=True)
+    assert made["error"].iloc[-1] < 0.25 * made["error"].iloc[0]
 
 
 @pytest.mark.long
