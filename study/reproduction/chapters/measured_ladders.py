@@ -7,6 +7,7 @@ there it is left out, and said so.
 # Matplotlib leaves the **kwargs of its methods untyped, pandas what comes out of a mask or a group.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -105,9 +106,7 @@ def ladders_figure(tables: Tables) -> Figure:
         panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panel.yaxis.set_major_formatter("{x:g}")
         panel.yaxis.set_minor_locator(NullLocator())
-        panel.set_xticks(
-            range(len(own)), [label.replace(" ", "\n", 2).replace("+\n", "+ ") for label in labels], fontsize=7.5
-        )
+        panel.set_xticks(range(len(own)), [textwrap.fill(label, 18) for label in labels], fontsize=7.5)
         panel.set_xlim(-0.4, len(own) - 0.6)
     for panel in axes[len(records) :]:
         panel.set_axis_off()
