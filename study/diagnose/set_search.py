@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from study.diagnose import set_screening
+from study.diagnose import candidates, set_screening
 from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate, unknowns_of
 from study.diagnose.set_screening import SetStart
 from study.equations.model import ModelTerm
@@ -32,7 +32,7 @@ class SetSearch:
 
     base: Baseline  # the model
     entries: dict[str, ModelTerm]  # the effects and their places
-    offered: dict[str, ModelTerm]  # the same with the shape parameters at which each was best alone
+    offered: dict[str, ModelTerm]  # those that are worth a fit, with shape parameters at which each explains most
     tried: dict[frozenset[str], FittedCandidate] = field(default_factory=dict[frozenset[str], FittedCandidate])
     ended_at: int | None = None  # effects in a set, at which the user ended the search
 
@@ -40,6 +40,10 @@ class SetSearch:
         """Sets of so many effects, or simple ones, that were fitted; the best first, what is not physical last."""
         fitted = (c for names, c in self.tried.items() if len(names) == size and not (simple and c.flexible))
         return sorted(fitted, key=by_power)
+
+    def asked(self, *, simple: bool) -> dict[str, ModelTerm]:
+        """The effects that are offered, or the simple ones."""
+        return {name: entry for name, entry in self.offered.items() if not simple or unknowns_of(entry) == 1}
 
     def fit(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
@@ -88,19 +92,20 @@ def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
 
 def searched(
     base: Baseline, singles: Sequence[FittedCandidate], settled: Sequence[FittedCandidate],
-    not_alone: Sequence[ModelTerm], done: Callable[[FittedCandidate], bool], fewer_than: int | None = None,
+    asked: Sequence[ModelTerm], done: Callable[[FittedCandidate], bool], fewer_than: int | None = None,
     progress: Progress | None = None,
 ) -> SetSearch:  # fmt: skip
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
     ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley,
-    ``not_alone`` simple ones beside which alone no motion stays finite. ``done`` says whether a set leaves nothing to
-    be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then sets of simple
-    effects with fewer are asked for. The user may end it (Ctrl-C): then what was fitted so far is there.
+    ``asked`` all effects at places, those too beside which alone no motion stays finite. ``done`` says whether a set
+    leaves nothing to be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then
+    sets of simple effects with fewer are asked for. The user may end it (Ctrl-C): then what was fitted so far is there.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
-    offered |= {entry.name: entry for entry in not_alone}
-    entries = {c.name: c.entry for c in singles} | {entry.name: entry for entry in not_alone}
+    if not base.several:  # damping that others leave nothing of lets a motion escape alone
+        offered |= {entry.name: entry for entry in asked if entry.name not in offered and unknowns_of(entry) == 1}
+    entries = {entry.name: entry for entry in asked} | {c.name: c.entry for c in singles}
     search = SetSearch(base, entries, offered, {frozenset(c.names): c for c in singles})
     sizes = range(2, MOST_EFFECTS + 1)
     search.fit(SetStart(frozenset(c.names), c.fit.model) for c in settled)
@@ -121,21 +126,21 @@ def _grow(
     done: Callable[[FittedCandidate], bool], fewer_than: int | None, progress: Progress | None,
 ) -> None:  # fmt: skip
     """Fit sets of growing size; ``reverse`` are those that the reverse system promises, by size."""
-    base, offered = search.base, search.offered
+    base = search.base
     best = next(iter(search.sets(1, simple=fewer_than is not None)), None)
     patient = True
     for size in sizes:
         simple = fewer_than is not None
         if best is None or (fewer_than is not None and size >= fewer_than):
             break
-        asked = {name: entry for name, entry in offered.items() if not simple or unknowns_of(entry) == 1}
-        starts = [start for start in reverse.get(size, ()) if start.names <= set(asked)]
-        for parent in _parents(search.sets(size - 1), simple=simple):
-            starts += set_screening.by_sensitivities(parent, asked, base, [size], EACH)[size]
+        starts = [start for start in reverse.get(size, ()) if start.names <= set(search.asked(simple=simple))]
         if size == 2:
-            starts += set_screening.by_sensitivities(None, asked, base, [size], EACH)[size]
+            starts += set_screening.by_sensitivities(None, search.asked(simple=simple), base, [size], EACH)[size]
+        for parent in _parents(search.sets(size - 1), simple=simple):
+            offer_beside(search, parent, simple=simple)
+            starts += set_screening.by_sensitivities(parent, search.asked(simple=simple), base, [size], EACH)[size]
         search.fit(starts, progress)
-        _exchange(search, asked, size, simple, progress)
+        _exchange(search, search.asked(simple=simple), size, simple, progress)
         larger = next(iter(search.sets(size, simple=simple)), None)
         gained = larger is not None and gains(best, larger, len(starts))
         if larger is None or not (gained or patient):
@@ -144,6 +149,28 @@ def _grow(
         best = larger if gained else best
         if fewer_than is None and done(best):
             fewer_than = best.unknowns
+
+
+def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) -> None:
+    """Offer effects with the shapes at which they explain most beside a fitted set, and those that were not offered.
+
+    Alone the motion may not show an effect at its place, nor bear it, and what has a shape of its own imitates others.
+    """
+    sides = {(e.term.name, e.place.path): name for name, e in search.offered.items()}  # one side of a place is enough
+    asked = [
+        entry
+        for name, entry in search.entries.items()
+        if (sides.get((entry.term.name, entry.place.path)) == name and entry.term.parameters and not simple)
+        or ((entry.term.name, entry.place.path) not in sides and not (simple and unknowns_of(entry) > 1))
+    ]
+    beside = [entry for entry in asked if entry.name not in parent.names]
+    if not beside:
+        return
+    found = candidates.screened(beside, shape_search.baseline(parent.fit, search.base.prepared))
+    for item in candidates.worth_fitting(found) if search.base.several else found:
+        entry = item.entry
+        if sides.setdefault((entry.term.name, entry.place.path), entry.name) == entry.name:
+            search.offered[entry.name] = replace(entry, parameters=item.points[0].parameters)
 
 
 def _side_valleys(search: SetSearch, sizes: Sequence[int]) -> None:

@@ -13,7 +13,7 @@ from study.compare.dependence import FamilyGain
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import VaryingCoefficient, varying_coefficients
 from study.diagnose import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, candidates, set_search, varying_candidates
-from study.diagnose.candidates import FittedCandidate, Progress, unknowns_of, with_best_settled
+from study.diagnose.candidates import FittedCandidate, Progress, with_best_settled
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
 from study.diagnose.ranked import Ranked
@@ -283,9 +283,8 @@ def _decide(
     changed = [row for row in rows if not any(row.fit is c.fit for c in tried)]
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
     known = {c.name for c in tried}
-    # damping that others leave nothing of lets a motion escape alone; of a structure's many, those tried are asked for
-    not_alone = [e for e in entries if not base.several and e.name not in known and unknowns_of(e) == 1]
-    search = search or searched(base, tried, settled, not_alone, _leaves_nothing, fewer_than, progress)
+    effects = [entry for entry in entries if entry.term.variation is None or entry.name in known]
+    search = search or searched(base, tried, settled, effects, _leaves_nothing, fewer_than, progress)
     deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
     if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
         rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)

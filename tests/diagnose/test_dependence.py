@@ -71,7 +71,7 @@ def two_effects():
 
 def test_both_of_two_effects_are_the_best_set_of_two(two_effects):
     made, _, base, rows = two_effects
-    search = set_search.searched(base, rows, [], [], lambda _: True)
+    search = set_search.searched(base, rows, [], [r.entry for r in rows], lambda _: True)
     assert set(search.sets(2)[0].names) == set(made.hidden)
     assert not search.sets(3)  # two leave nothing
 

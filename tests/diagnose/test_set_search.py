@@ -1,16 +1,20 @@
 """The path of the search over sets of effects, on a table of what each set leaves: nothing is fitted here."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from study.diagnose import set_screening, set_search
+from study.diagnose import candidates, set_screening, set_search
 from study.diagnose.set_screening import SetStart
 from study.diagnose.set_search import SetSearch, gains, searched
+from study.equations.model import ModelTerm
+from study.equations.place import Place
+from study.identify.time_domain import shape_search
 from study.support.arrays import Floats
 
 N = 4800
@@ -28,8 +32,9 @@ def left_by(amounts: Mapping[str, float]) -> Floats:
 
 def effect(name: str) -> Any:
     """An effect with a coefficient, and so many shape parameters as are its unknowns more than that."""
-    shape = SimpleNamespace(variation=None, components=(name,), parameters=(name,) * (UNKNOWNS.get(name, 1) - 1))
-    return SimpleNamespace(name=name, term=shape)
+    shapes = (0.0,) * (UNKNOWNS.get(name, 1) - 1)
+    term = SimpleNamespace(name=name, variation=None, components=(name,), parameters=shapes)
+    return ModelTerm(cast("Any", term), (None,), shapes)
 
 
 def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: str = "") -> Any:
@@ -42,7 +47,7 @@ def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: st
     )
     record = SimpleNamespace(stretches=())
     return SimpleNamespace(
-        names=chosen, name=" + ".join(chosen), entry=SimpleNamespace(name=chosen[0]), unknowns=unknowns,
+        names=chosen, name=" + ".join(chosen), entry=effect(chosen[0]), unknowns=unknowns,
         flexible=unknowns > len(chosen), unphysical=unphysical, power=float(np.mean(left**2)),
         fit=SimpleNamespace(model=model, residual=left[:N]),
         prediction=SimpleNamespace(residual=left[N:], prepared=SimpleNamespace(record=record, free=False)),
@@ -56,10 +61,13 @@ class Bench:
         self.leaves = leaves
         self.fitted: list[tuple[str, str | None]] = []  # each set, and the smaller one that it began beside
         self.asked: list[tuple[str | None, int]] = []  # sets beside which others were asked for, and of which size
+        self.screened: list[tuple[str, str]] = []  # the set beside which, and the effects whose promise was asked for
         self.proposed: Callable[[frozenset[str], int], Sequence[Iterable[str]]] = self.every
         monkeypatch.setattr(SetSearch, "fitted", lambda _, start: self.fit(start))
         monkeypatch.setattr(set_screening, "by_sensitivities", self.by_sensitivities)
         monkeypatch.setattr(set_screening, "by_the_reverse_system", lambda *_: {})
+        monkeypatch.setattr(shape_search, "baseline", lambda fit, _: SimpleNamespace(fit=fit))
+        monkeypatch.setattr(candidates, "screened", self.promising)
 
     def fit(self, start: SetStart) -> Any:
         beside = None if start.beside is None else start.beside.name
@@ -81,15 +89,22 @@ class Bench:
             for n in sizes
         }
 
+    def promising(self, asked: Sequence[ModelTerm], beside: Any) -> list[shape_search.Screened]:
+        names = "".join(entry.name for entry in beside.fit.model.terms)
+        self.screened.append((names, "".join(sorted(entry.name for entry in asked))))
+        points = [tuple(float(len(names)) for _ in entry.parameters) for entry in asked]
+        return [
+            shape_search.Screened(e, (shape_search.Start(p, (0.0,), 1.0),)) for e, p in zip(asked, points, strict=True)
+        ]
+
     def search(
         self, *, done: bool = False, fewer_than: int | None = None, lost: str = "", progress: Any = None,
         from_above: bool = False,
     ) -> SetSearch:  # fmt: skip
-        """``lost`` are effects whose fit alone has no finite motion; of many places no whole is asked for."""
+        """``lost`` are effects without a fit alone; of many places no whole is asked for."""
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES if name not in lost]
-        not_alone = [effect(name) for name in lost]
-        base: Any = SimpleNamespace(several=not from_above)
-        return searched(base, singles, [], not_alone, lambda _: done, fewer_than, progress)
+        base: Any = SimpleNamespace(several=not from_above, prepared=None)
+        return searched(base, singles, [], [effect(name) for name in NAMES], lambda _: done, fewer_than, progress)
 
     def sizes(self) -> set[int]:
         """Of the sets of several effects."""
@@ -322,3 +337,33 @@ def test_what_grows_astray_is_found_from_above(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(set_search, "_with_shapes", lambda *_: [])
     assert found(from_above=False)[0] != "abcd"
     assert found(from_above=True) == ("abcd", [every.name])
+
+
+def test_what_was_not_fitted_alone_is_asked_for_beside_the_best_sets_and_each_shape_anew(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    bench = Bench(monkeypatch, hidden("abf"))
+    search = bench.search(lost="b")
+    assert best(search, 3) == "abf"
+    assert bench.screened[0] == ("f", "b")  # the best alone has the only shape
+    assert ("a", "f") in bench.screened
+    assert search.offered["f"].parameters == (float(len(bench.screened[-1][0])),) * 2
+
+    simple = Bench(monkeypatch, hidden("abf"))
+    simple.search(lost="bf", fewer_than=set_search.MOST_EFFECTS)
+    assert {asked for _, asked in simple.screened} == {"b"}  # and b no more once it is offered
+
+
+def test_the_other_side_of_a_place_is_not_asked_for(monkeypatch: pytest.MonkeyPatch):
+    def between(*ends: str) -> ModelTerm:
+        return replace(effect("b"), place=Place("between", ends))
+
+    bench = Bench(monkeypatch, hidden("ab"))
+    here, there = between("x", "y"), between("y", "x")
+    nothing: Any = SimpleNamespace(several=True, prepared=None)
+    entries = {here.name: here, there.name: there}
+    for offered in ({here.name: here}, {}):
+        search = SetSearch(nothing, entries, dict(offered))
+        set_search.offer_beside(search, candidate("a", {}), simple=False)
+        assert list(search.offered) == [here.name]
+    assert len(bench.screened) == 1  # where one side was offered nothing is asked
