@@ -29,7 +29,7 @@ from study.records.spectra import StretchTransforms
 from study.support import statistics
 from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
-from study.support.least_squares import least_squares
+from study.support.least_squares import Factored, factored, least_squares
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
@@ -73,8 +73,13 @@ class Unexplained:
         return self.base.paths(self.transforms.size)
 
     @cached_property
+    def early(self) -> Factored:
+        """The model's own coefficients and the residual, of the fitting part."""
+        return factored(self.own[: self.split], self.residual[: self.split])
+
+    @cached_property
     def own_amounts(self) -> Floats:
-        """What the model's own coefficients take of the residual of the fitting part, shape (p,)."""
+        """What those coefficients take of that residual, shape (p,)."""
         return least_squares(self.own[: self.split], self.residual[: self.split], 1e-6)
 
     @cached_property
@@ -299,9 +304,7 @@ def _times(place: Place, left: Unexplained) -> list[Floats]:
 
 def _held_out(left: Unexplained, columns: Floats) -> Gain:
     """What amounts from the fitting part, beside the model's own, explain of the judging part."""
-    design = np.hstack([left.own, columns])
-    early, late = design[: left.split], design[left.split :]
-    amounts = least_squares(early, left.residual[: left.split], 1e-6)
-    amounts[: left.own.shape[1]] -= left.own_amounts
+    amounts, keys = left.early.beside(columns[: left.split], 1e-6), left.own.shape[1]
+    change = left.own[left.split :] @ (amounts[:keys] - left.own_amounts) + columns[left.split :] @ amounts[keys:]
     evenly = left.base.prepared.free  # of a decay: what a change explains lies in the loud blocks
-    return statistics.gain_beside(left.residual[left.split :], late @ amounts, left.beside_own, evenly=evenly)
+    return statistics.gain_beside(left.residual[left.split :], change, left.beside_own, evenly=evenly)

@@ -4,6 +4,7 @@ One number tells what is rounding: of columns of unit length, sums of thousands 
 largest. What singular values or variances fall below that share of the largest is known of nothing.
 """
 
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -20,12 +21,44 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -
 
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
+    scale = _scale(columns)
+    amounts: Floats = np.asarray(_lstsq(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
+    return (amounts.T / scale).T
+
+
+def _scale(columns: Floats) -> Floats:
+    """Length of each column, infinity for those that are nothing beside the others."""
     peak = np.maximum(np.max(columns, axis=0, initial=0.0), -np.min(columns, axis=0, initial=0.0))
     least = np.sqrt(np.finfo(float).tiny) * np.max(peak, initial=0.0)  # the square of a larger amount may be no number
     peak = np.where(peak > least, peak, np.inf)  # first, so that no square overflows
-    scale = peak * length_or_one(columns / peak)
-    amounts: Floats = np.asarray(_lstsq(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
-    return (amounts.T / scale).T
+    return peak * length_or_one(columns / peak)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """Columns and a target that are asked beside many others: their part of each least squares is done once."""
+
+    scale: Floats
+    basis: Floats  # orthonormal, shape (n, columns)
+    triangle: Floats  # the columns over their scale by that basis
+    target: Floats  # shape (n,)
+
+    def beside(self, others: Floats, cutoff: float = INDISTINCT) -> Floats:
+        """Amounts of the columns and of others that approximate the target best, as :func:`least_squares` has them."""
+        scale = _scale(others)
+        along = self.basis.T @ (others / scale)
+        basis, triangle = np.linalg.qr(others / scale - self.basis @ along)
+        nothing = np.zeros((len(triangle), len(self.triangle)))
+        both = np.block([[self.triangle, along], [nothing, triangle]])
+        seen = np.concatenate([self.basis.T @ self.target, basis.T @ self.target])
+        amounts: Floats = np.asarray(_lstsq(both, seen, rcond=cutoff)[0], dtype=np.float64)
+        return amounts / np.concatenate([self.scale, scale])
+
+
+def factored(columns: Floats, target: Floats) -> Factored:
+    """Columns, shape (n, any), and a target, shape (n,), for many least squares with other columns beside them."""
+    scale = _scale(columns)
+    return Factored(scale, *np.linalg.qr(columns / scale), target)
 
 
 def pseudo_inverse(columns: Floats, cutoff: float = INDISTINCT) -> Floats:
