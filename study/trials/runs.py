@@ -151,7 +151,10 @@ def change_orders(first: int = 660_001, each: int = 20) -> list[Order]:
 
 
 def run_trial(order: Order) -> Row:
-    """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
+    """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``.
+
+    ``seconds`` are of processor time, of all cores together: other work beside a trial does not count.
+    """
     judged = _judged_planned if order.kind == PLANNED else JUDGES.get(order.test, _judged_test)
     nothing = "" if order.test == DRIVEN_MASS else NO_EFFECT
     row: Row = {
@@ -159,7 +162,7 @@ def run_trial(order: Order) -> Row:
         "response": order.response, "coordinates": order.coordinates,
         "hidden": "" if order.hidden is None else "+".join(order.hidden) or nothing,
     }  # fmt: skip
-    begun = time.perf_counter()
+    begun = time.process_time()
     try:
         fault = FAULTS[order.seed % len(FAULTS)] if order.faults == WITH else NO_FAULT
         trial = _made(order, fault)
@@ -170,11 +173,11 @@ def run_trial(order: Order) -> Row:
             **{f"fault_{key}": trial.fault.get(key, "") for key in ("channel", "value", "unit")},
             "hidden": "+".join(e.term.name for e in trial.effects) or nothing,
         }  # fmt: skip
-        begun = time.perf_counter()
+        begun = time.process_time()
         row |= judged(order, trial)
     except StudyError as error:
         row["trouble"] = str(error)
-    row["seconds"] = round(time.perf_counter() - begun, 1)
+    row["seconds"] = round(time.process_time() - begun, 1)
     return {column: row.get(column, "") for column in KEPT_TABLES[table_of(order)].columns}
 
 
