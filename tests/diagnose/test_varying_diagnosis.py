@@ -13,6 +13,7 @@ from study.equations.model_file import parse_model
 from study.identify.time_domain.promised_changes import promised_changes
 from study.records.record import Record
 from study.records.record_layout import Layout
+from study.trials.draw import make_trial
 from study.trials.varying import make_varying_trial
 from study.way_in.compare_records import compare_records
 from tests.public_records import DATA, needs
@@ -55,6 +56,18 @@ def test_a_linear_system_and_a_cubic_one_promise_no_change_to_search_for():
         seen = promised_changes(fit, found.comparison.prepared, fit.model.terms)
         assert seen is None or not seen.alone
         assert not found.put_off
+
+
+def test_in_one_decay_nothing_changes_with_time_as_its_amplitude_falls_with_it(monkeypatch: pytest.MonkeyPatch):
+    trial = make_trial(630_011, ("quadratic_damping",), 0.002, "displacement", test="free_decay")
+    comparison = compare_records([trial.record], trial.believed).comparison
+    fit, prepared = comparison.fit, comparison.prepared
+    assert prepared.free
+    assert promised_changes(fit, prepared, fit.model.terms) is None
+    monkeypatch.setattr("study.identify.time_domain.promised_changes._one_run", lambda _: False)
+    seen = promised_changes(fit, prepared, fit.model.terms)
+    assert seen is not None
+    assert any(entry.name == "linear_damping_over_time" for entry in seen.shares)
 
 
 def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():

@@ -6,6 +6,7 @@ time, or of a further channel, are tried for each coefficient at once, at the co
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import fdtrc
@@ -19,6 +20,7 @@ from study.identify.time_domain.part_fit import fit_part, rough_steps, run_of
 from study.identify.time_domain.shape_search import Baseline, baseline
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import FORCE, Prepared
+from study.records.record import Record
 from study.records.record_layout import in_turns
 from study.support.arrays import Floats
 from study.support.errors import StudyError
@@ -76,12 +78,13 @@ def promised_changes(fit: FreeRunFit, prepared: Prepared, of: Sequence[ModelTerm
 def _curves(of: Sequence[ModelTerm], model: Model, prepared: Prepared) -> list[ModelTerm]:
     """Curves of their coefficients along time and with every channel that changes; of one side too with channels."""
     channels = [c for c in prepared.record.extra if np.ptp(prepared.record[c]) > 0.0 and c.isidentifier()]
+    with_time = () if prepared.free and _one_run(prepared.record) else (ALONG_TIME,)
     found = list[ModelTerm]()
     for entry in of:
         term = entry.term
         if term.variation or term.name == "inertia" or len(term.symbols) > 1 or term.effort or external(term):
             continue
-        for along in (ALONG_TIME, *channels):
+        for along in (*with_time, *channels):
             for side in _sides(entry, along, prepared):
                 try:
                     changing = varying(Variation(term, along, side=side))
@@ -89,6 +92,12 @@ def _curves(of: Sequence[ModelTerm], model: Model, prepared: Prepared) -> list[M
                 except StudyError:  # a channel that formulas cannot name
                     continue
     return [e for e in found if e.name not in model and e.symbols]
+
+
+def _one_run(record: Record) -> bool:
+    """Whether a record is one measured without a gap: of a decay, amplitude falls with time, and each looks as both."""
+    parts = sorted(record.stretches, key=lambda stretch: stretch.first)
+    return all(a.source is b.source and a.last == b.first for a, b in pairwise(parts))
 
 
 def _sides(entry: ModelTerm, along: str, prepared: Prepared) -> tuple[str, ...]:
