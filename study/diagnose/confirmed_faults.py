@@ -38,7 +38,10 @@ def diagnose_accounted(
 
     def found(one: Accounted) -> Diagnosed:
         diagnosis = diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
-        return Diagnosed(diagnosis, one, confirmed(one.faults, diagnosis))
+        faults = one.faults
+        if diagnosis.comparison.model is not one.comparison.model:  # seen beside values that are let go
+            faults = still_seen(faults, diagnosis.comparison.fit, diagnosis.comparison.prepared)
+        return Diagnosed(diagnosis, one, confirmed(faults, diagnosis))
 
     first = found(accounted)
     if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault

@@ -7,13 +7,15 @@ samples a period make it look like relaxation, and a resonance above the Nyquist
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
 from study.compare.prediction import predict
 from study.diagnose.candidates import Progress
-from study.diagnose.verdict import NOTHING, Diagnosis, diagnose, search_part
+from study.diagnose.held_values import diagnose_with_values_let_go
+from study.diagnose.verdict import NOTHING, Diagnosis, search_part
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
@@ -31,18 +33,21 @@ def diagnose_as_read(
     without: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """The diagnosis of :func:`study.diagnose.verdict.diagnose`, unless another reading of the force explains it all.
+    """The diagnosis of :func:`diagnose_with_values_let_go`, unless another reading of the force explains it all.
 
     That reading must leave significantly less than the band-limited one and less than the best candidate does, and
     nothing may be missing with it: then the diagnosis is that of the record as it is read then, and its notes say so.
     """
-    found = diagnose(comparison, extra=extra, without=without, progress=progress)
+    diagnosed = partial(diagnose_with_values_let_go, extra=extra, without=without, progress=progress)
+    found = diagnosed(comparison)
     known = _sampled(comparison).record.between != BAND_LIMITED  # by what it does to the response
     if known or found.verdict == NOTHING or comparison.fit.restarts or not comparison.fit.keys:
         return found
     best = min((row.response_error for row in found.candidates), default=comparison.prediction.error)
     for prepared in _better_read(comparison, min(best, comparison.prediction.error)):
-        other = diagnose(compare(comparison.model, prepared), extra=extra, without=without, progress=progress)
+        other = diagnose_with_values_let_go(
+            compare(comparison.model, prepared), extra=extra, without=without, progress=progress
+        )
         if other.verdict == NOTHING:
             return other
     return found

@@ -1,0 +1,108 @@
+"""What a model holds at a value that its record contradicts, before an effect is called missing.
+
+A spring constant of a data sheet, or the damping of another day, that is wrong by a tenth leaves an error that effects
+of the library imitate: friction and a damping that grows with displacement stand for too little damping.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from study.compare.comparison import Comparison, compare
+from study.compare.prediction import predict
+from study.diagnose.candidates import Progress
+from study.diagnose.ranked import Ranked
+from study.diagnose.verdict import NOTHING, Diagnosis, diagnose
+from study.equations.terms import Term
+from study.identify.time_domain.part_fit import fit_part, run_and_slopes, uncertainty
+from study.identify.time_domain.rivals import larger
+from study.support import statistics
+from study.support.errors import StudyError
+from study.support.numbers import enumerated, percent
+from study.support.thresholds import K
+
+HOW = "no value, or held: false, in the model file fits"  # by which the note is known
+
+
+def diagnose_with_values_let_go(
+    comparison: Comparison,
+    *,
+    extra: Sequence[Term] = (),
+    without: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """The diagnosis of :func:`study.diagnose.verdict.diagnose`, with values let go that stand for an effect it names.
+
+    Values that the model holds are fitted where with these, in place of one of the effects of the best set, the model
+    leaves no more. Those stay held that the fit then does not contradict. The diagnosis is that of the model with the
+    others fitted, and its notes say so.
+    """
+    found = diagnose(comparison, extra=extra, without=without, progress=progress)
+    keys = _coefficients(comparison)
+    best = next(iter([*found.sets, *found.candidates]), None)
+    if found.verdict == NOTHING or best is None or not keys or not _stand_in(keys, best, comparison):
+        return found
+    diagnosed = partial(diagnose, extra=extra, without=without, progress=progress)
+    try:
+        wrong = _contradicted(keys, diagnosed(_let_go(comparison, keys)), comparison)
+        return diagnosed(_let_go(comparison, tuple(wrong), _note(wrong, comparison))) if wrong else found
+    except StudyError:
+        return found
+
+
+def _let_go(comparison: Comparison, keys: Sequence[str], *notes: str) -> Comparison:
+    """The comparison with these values fitted, and notes of it."""
+    prepared = replace(comparison.prepared, notes=(*comparison.prepared.notes, *notes))
+    return compare(comparison.model.with_values(dict.fromkeys(keys)), prepared)
+
+
+def _coefficients(comparison: Comparison) -> tuple[str, ...]:
+    """Coefficients that the model holds and that the record tells of; of free decays ratios to the mass alone."""
+    model = comparison.model
+    if model.modal:
+        return ()
+    free = comparison.prepared.free
+    told = {s for t in model.terms for s in t.symbols if not (free and t.term.name == "inertia")}
+    return tuple(key for key in comparison.fit.held if key in told)
+
+
+def _stand_in(keys: Sequence[str], best: Ranked, comparison: Comparison) -> bool:
+    """Whether with these fitted, without one of the best effects, the model leaves no more than with all of them."""
+    prepared = comparison.prepared
+    for name in best.names:
+        fewer = best.fit.model.without_term(name)
+        held = [key for key in comparison.fit.held if key not in keys]
+        try:
+            fit = fit_part(fewer, prepared, held, steps=best.fit.steps_per_sample)
+            left = predict(fit, prepared).residual
+        except StudyError:
+            continue
+        if statistics.worse(left, best.prediction.residual) < K and larger(comparison.prediction.residual, left):
+            return True
+    return False
+
+
+def _contradicted(
+    keys: Sequence[str], freed: Diagnosis, comparison: Comparison
+) -> dict[str, tuple[float, float]]:  # fmt: skip
+    """Values, with standard errors, of those that are others than the model holds, beside what is missing."""
+    fit, prepared = (freed.answer or freed.comparison).fit, comparison.prepared
+    errors = np.sqrt(np.diag(uncertainty(fit, prepared, *run_and_slopes(fit, prepared))))
+    found = {key: (value, error) for key, value, error in zip(fit.keys, fit.values.tolist(), errors, strict=False)}
+    given = comparison.fit.model.numbers()  # what is held is as given
+    return {key: found[key] for key in keys if abs(found[key][0] - given[key]) > K * found[key][1]}
+
+
+def _note(wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> str:
+    held = {c.key: c for c in comparison.coefficients}
+    each = [
+        f"{key} is {value:.4g} +- {error:.2g}{held[key].unit and f' {held[key].unit}'}, not {held[key].value:.4g}"
+        for key, (value, error) in wrong.items()
+    ]
+    left = percent(comparison.prediction.error)
+    return (
+        f"this record contradicts what the model holds: {enumerated(each)}; with that held {left} of the response is "
+        f"left ({HOW} it)"
+    )

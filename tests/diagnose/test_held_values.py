@@ -1,0 +1,66 @@
+"""A value that the model holds and the record contradicts is told as such, and no effect is called missing for it."""
+
+import numpy as np
+
+from study.compare.comparison import compare
+from study.diagnose.diagnosis_files import choices_in_words
+from study.diagnose.held_values import diagnose_with_values_let_go
+from study.diagnose.verdict import NOTHING, diagnose
+from study.equations.model import Model, ModelTerm
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY, get
+from study.records.prepared import prepare_record
+from study.records.record import Record
+
+DT, SAMPLES = 0.02, 2048
+TRIED = ("relaxation", "cubic_stiffness", "displacement_damping", "coulomb_friction")  # so that a test is soon done
+WITHOUT = tuple(name for name in LIBRARY if name not in TRIED)
+TRUE = {"inertia": 2.0, "linear_damping": 3.0, "linear_stiffness": 800.0}
+
+
+def model(**values):
+    return Model("rig", tuple(ModelTerm(get(name), (value,), ()) for name, value in (TRUE | values).items()))
+
+
+def record(**more):
+    rng = np.random.default_rng(4)
+    run = simulate(model(**more), rng.standard_normal(SAMPLES), DT, Integrator("rk4", 8))
+    seen = run["displacement"] + 0.01 * np.std(run["displacement"]) * rng.standard_normal(SAMPLES)
+    return prepare_record(Record(DT, {"force": run["force"], "displacement": seen}, run.units, "made"))
+
+
+def contradicted(diagnosis):
+    return [note for note in choices_in_words(diagnosis.comparison.notes) if "contradicts" in note]
+
+
+def test_a_damping_that_is_held_too_small_is_no_missing_effect():
+    comparison = compare(model(linear_damping=2.5), record())
+    assert diagnose(comparison, without=WITHOUT).verdict != NOTHING  # effects that imitate damping
+    found = diagnose_with_values_let_go(comparison, without=WITHOUT)
+    assert found.verdict == NOTHING
+    (said,) = contradicted(found)
+    assert "c is 3.0" in said or "c is 2.9" in said or "c is 3 " in said
+    assert "not 2.5" in said
+    assert found.comparison.fit.keys == ("c",)  # mass and stiffness are right and stay held
+
+
+def test_beside_an_effect_that_is_missing_a_wrong_value_is_let_go_and_a_right_one_is_not():
+    seen = record(cubic_stiffness=4e5)
+    for damping, fitted in ((2.0, ("c",)), (3.0, ())):
+        comparison = compare(model(linear_damping=damping), seen)
+        found = diagnose_with_values_let_go(comparison, without=WITHOUT)
+        assert found.answer is not None
+        assert found.answer.names == ("cubic_stiffness",)
+        assert found.comparison.fit.keys == fitted
+        assert len(contradicted(found)) == len(fitted)
+
+
+def test_of_free_decays_no_mass_is_let_go():
+    """They tell ratios to it alone: with all coefficients let go it would be anything."""
+    run = simulate(model(linear_damping=0.3), np.zeros(SAMPLES), DT, Integrator("rk4", 8), initial=(0.01, 0.0))
+    noise = np.random.default_rng(5).standard_normal(SAMPLES)
+    seen = {"force": run["force"], "displacement": run["displacement"] + 1e-5 * noise}
+    comparison = compare(model(linear_damping=0.25), prepare_record(Record(DT, seen, run.units, "decay")))
+    found = diagnose_with_values_let_go(comparison, without=WITHOUT)
+    assert found.verdict == NOTHING
+    assert found.comparison.fit.keys == ("c",)
