@@ -94,6 +94,7 @@ class Stage:
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
     on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
     by_record: ByRecord | None = None  # coefficients of each record's own; None as long as nobody has asked
+    given: Model | None = None  # as it was asked about, where values that it held are let go
     next_test: bytes = b""  # PNG of what tied effects would answer to the test that decides, if one is likely to
 
     @property
@@ -277,9 +278,10 @@ def examined(session: Session, progress: Progress | None = None) -> tuple[Stage,
 def with_diagnosis(stage: Stage, found: Diagnosed) -> Stage:
     """A stage whose terms were weighed with its diagnosis, in words too, and what each candidate would leave."""
     comparison = found.diagnosis.comparison
-    if comparison.prepared.plan != stage.comparison.prepared.plan:  # laid out anew, as changes ask for
+    anew = comparison.prepared.plan != stage.comparison.prepared.plan  # laid out, as changes ask for
+    if anew or comparison.model != stage.comparison.model:  # with values let go that the record contradicts
         laid = stage_of(replace(stage.accounted, comparison=comparison), stage.label, stage.added, stage.dropped)
-        stage = replace(laid, unneeded=stage.unneeded)
+        stage = replace(laid, unneeded=stage.unneeded, given=stage.model)
     words = (
         diagnosis_in_words(found.diagnosis),
         *(fault.says for fault in found.faults),
@@ -328,8 +330,9 @@ def _still_missing(rows: Sequence[Ranked], comparison: Comparison) -> list[dict[
 
 def with_stage(session: Session, stage: Stage) -> Session:
     """The session with a diagnosed stage in place of those of its model; unchanged if that was undone meanwhile."""
+    asked = stage.given or stage.model
     stages = (
-        replace(stage, label=r.label, added=r.added, dropped=r.dropped) if r.model == stage.model else r
+        replace(stage, label=r.label, added=r.added, dropped=r.dropped) if r.model == asked else r
         for r in session.stages
     )
     return replace(session, stages=tuple(stages))

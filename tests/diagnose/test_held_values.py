@@ -1,14 +1,20 @@
 """A value that the model holds and the record contradicts is told as such, and no effect is called missing for it."""
 
+from functools import partial
+
 import numpy as np
+import pytest
 
 from study.compare.comparison import compare
+from study.diagnose import confirmed_faults
 from study.diagnose.diagnosis_files import choices_in_words
+from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.held_values import diagnose_with_values_let_go
 from study.diagnose.verdict import NOTHING, diagnose
 from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
+from study.explore import session as sessions
 from study.records.prepared import prepare_record
 from study.records.record import Record
 
@@ -64,3 +70,16 @@ def test_of_free_decays_no_mass_is_let_go():
     found = diagnose_with_values_let_go(comparison, without=WITHOUT)
     assert found.verdict == NOTHING
     assert found.comparison.fit.keys == ("c",)
+
+
+@pytest.mark.long
+def test_what_is_added_on_the_page_is_added_beside_the_value_that_was_let_go(monkeypatch: pytest.MonkeyPatch):
+    few = partial(diagnose_as_read, without=WITHOUT)
+    monkeypatch.setattr(confirmed_faults, "diagnose_as_read", few)
+    session = sessions.begin(model(linear_damping=2.5), record(cubic_stiffness=4e5))
+    session = sessions.with_stage(session, sessions.examined(session)[0])
+    assert session.now.diagnosis is not None
+    assert session.now.comparison.fit.keys == ("c",)
+    promised = session.now.diagnosis.answer.response_error if session.now.diagnosis.answer else None
+    grown = sessions.with_added(session, "cubic_stiffness")
+    assert grown.now.comparison.prediction.error == pytest.approx(promised, rel=0.02)
