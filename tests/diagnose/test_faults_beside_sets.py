@@ -83,12 +83,13 @@ def diagnosed(
     """What comes out, and how many diagnoses were made; ``found`` are the effects of each, what is left, the error."""
     made: list[tuple[str, ...]] = []
 
-    def diagnosis(*_: Any, **__: Any) -> Any:
+    def diagnosis(comparison: Any, **_: Any) -> Any:
         names, left, error = found[len(made)]
         made.append(names)
         answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
         changes = any("_over_" in name for name in names)
-        return SimpleNamespace(answer=answer, left=left, verdict=SEVERAL if names else UNKNOWN, changes=changes)
+        verdict = SEVERAL if names else UNKNOWN
+        return SimpleNamespace(answer=answer, left=left, verdict=verdict, changes=changes, comparison=comparison)
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
