@@ -8,7 +8,7 @@ from study.compare.varying_coefficients import varying_fields
 from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
-from study.diagnose.held_values import HOW
+from study.diagnose.held_values import CONTRADICTED
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
 from study.diagnose.next_test import suggested
 from study.diagnose.next_test_report import advice_in_words, next_test_fields
@@ -39,7 +39,7 @@ def all_names(record: Record) -> str:
 
 def choices_in_words(notes: Sequence[str]) -> list[str]:
     """What was chosen for the user, who may choose else, and what spoils the answer: said beside the verdict."""
-    said = [note for note in notes if HOW in note]
+    said = [note for note in notes if CONTRADICTED in note]
     return said + [note for note in notes if "(--" in note or "too coarsely" in note]
 
 

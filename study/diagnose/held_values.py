@@ -23,7 +23,7 @@ from study.support.errors import StudyError
 from study.support.numbers import enumerated, percent
 from study.support.thresholds import K
 
-HOW = "no value, or held: false, in the model file fits"  # by which the note is known
+CONTRADICTED = "this record contradicts what the model holds"  # by which the note is known
 
 
 def diagnose_with_values_let_go(
@@ -103,6 +103,6 @@ def _note(wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> s
     ]
     left = percent(comparison.prediction.error)
     return (
-        f"this record contradicts what the model holds: {enumerated(each)}; with that held {left} of the response is "
-        f"left ({HOW} it)"
+        f"{CONTRADICTED}: {enumerated(each)}; with that held {left} of the response is left (no value, or held: false, in "
+        "the model file fits it)"
     )
