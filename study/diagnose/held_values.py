@@ -103,6 +103,6 @@ def _note(wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> s
     ]
     left = percent(comparison.prediction.error)
     return (
-        f"{CONTRADICTED}: {enumerated(each)}; with that held {left} of the response is left (no value, or held: false, in "
-        "the model file fits it)"
+        f"{CONTRADICTED}: {enumerated(each)}; with that held {left} of the response is left (no value, or held: false, "
+        "in the model file fits it)"
     )
