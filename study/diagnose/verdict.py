@@ -304,6 +304,8 @@ def _decide(
         verdict, answer, left = PARTLY_KNOWN, core, _left(core.fit, core.prediction)
         good = [core, *(r for r in good if r.name != core.name)]
     if verdict != UNKNOWN:
+        alone = len(answer.entries) == 1 and all(r.name != answer.name for r in rows)  # it was offered beside others
+        rows = [answer, *rows] if alone else rows
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
     return _Decision(verdict, rows, left, good, search.ended_at)
 
