@@ -70,10 +70,9 @@ def _coefficients(comparison: Comparison) -> tuple[str, ...]:
 
 def _stand_in(keys: Sequence[str], best: Ranked, comparison: Comparison) -> bool:
     """Whether with these fitted, without one of the best effects, the model leaves no more than with all of them."""
-    prepared = comparison.prepared
+    prepared, held = comparison.prepared, [key for key in comparison.fit.held if key not in keys]
     for name in best.names:
         fewer = best.fit.model.without_term(name)
-        held = [key for key in comparison.fit.held if key not in keys]
         try:
             fit = fit_part(fewer, prepared, held, steps=best.fit.steps_per_sample)
             left = predict(fit, prepared).residual
@@ -90,9 +89,9 @@ def _contradicted(
     """Values, with standard errors, of those that are others than the model holds, beside what is missing."""
     fit, prepared = (freed.answer or freed.comparison).fit, comparison.prepared
     errors = np.sqrt(np.diag(uncertainty(fit, prepared, *run_and_slopes(fit, prepared))))
-    found = {key: (value, error) for key, value, error in zip(fit.keys, fit.values.tolist(), errors, strict=False)}
+    found = zip(fit.keys, fit.values.tolist(), errors.tolist(), strict=False)  # behind them those of initial states
     given = comparison.fit.model.numbers()  # what is held is as given
-    return {key: found[key] for key in keys if abs(found[key][0] - given[key]) > K * found[key][1]}
+    return {key: (value, e) for key, value, e in found if key in keys and abs(value - given[key]) > K * e}
 
 
 def _note(wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> str:
