@@ -46,16 +46,19 @@ def diagnose_with_values_let_go(
         return found
     diagnosed = partial(diagnose, extra=extra, without=without, progress=progress)
     try:
-        wrong = _contradicted(keys, diagnosed(_let_go(comparison, keys)), comparison)
-        return diagnosed(_let_go(comparison, tuple(wrong), _note(wrong, comparison))) if wrong else found
+        freed = diagnosed(_let_go(comparison, keys))
+        wrong = _contradicted(keys, freed, comparison)
+        if not wrong:
+            return found
+        told = freed if len(wrong) == len(keys) else diagnosed(_let_go(comparison, tuple(wrong)))
     except StudyError:
         return found
+    return replace(told, comparison=replace(told.comparison, notes=(*told.comparison.notes, _note(wrong, comparison))))
 
 
-def _let_go(comparison: Comparison, keys: Sequence[str], *notes: str) -> Comparison:
-    """The comparison with these values fitted, and notes of it."""
-    prepared = replace(comparison.prepared, notes=(*comparison.prepared.notes, *notes))
-    return compare(comparison.model.with_values(dict.fromkeys(keys)), prepared)
+def _let_go(comparison: Comparison, keys: Sequence[str]) -> Comparison:
+    """The comparison with these values fitted."""
+    return compare(comparison.model.with_values(dict.fromkeys(keys)), comparison.prepared)
 
 
 def _coefficients(comparison: Comparison) -> tuple[str, ...]:

@@ -1,16 +1,17 @@
 """A value that the model holds and the record contradicts is told as such, and no effect is called missing for it."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
-from study.compare.comparison import compare
+from study.compare.comparison import Comparison, compare
 from study.diagnose import confirmed_faults
 from study.diagnose.diagnosis_files import choices_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.held_values import diagnose_with_values_let_go
-from study.diagnose.verdict import NOTHING, diagnose
+from study.diagnose.verdict import NOTHING, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
@@ -50,6 +51,21 @@ def test_a_damping_that_is_held_too_small_is_no_missing_effect():
     assert found.comparison.fit.keys == ("c",)  # mass and stiffness are right and stay held
 
 
+def test_where_all_that_is_held_is_wrong_one_diagnosis_with_it_fitted_is_enough(monkeypatch: pytest.MonkeyPatch):
+    made: list[tuple[str, ...]] = []
+
+    def counted(comparison: Comparison, **options: Any) -> Diagnosis:
+        made.append(comparison.fit.keys)
+        return diagnose(comparison, **options)
+
+    monkeypatch.setattr("study.diagnose.held_values.diagnose", counted)
+    held = model(linear_damping=2.5).with_values({"m": None, "k": None})
+    found = diagnose_with_values_let_go(compare(held, record()), without=WITHOUT)
+    assert found.verdict == NOTHING
+    assert made == [("m", "k"), ("m", "c", "k")]
+    assert "not 2.5" in contradicted(found)[0]
+
+
 def test_beside_an_effect_that_is_missing_a_wrong_value_is_let_go_and_a_right_one_is_not():
     seen = record(cubic_stiffness=4e5)
     for damping, fitted in ((2.0, ("c",)), (3.0, ())):
@@ -70,6 +86,7 @@ def test_of_free_decays_no_mass_is_let_go():
     found = diagnose_with_values_let_go(comparison, without=WITHOUT)
     assert found.verdict == NOTHING
     assert found.comparison.fit.keys == ("c",)
+    assert len(contradicted(found)) == 1
 
 
 @pytest.mark.long
