@@ -44,7 +44,7 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
     """Figures by the stem of their file name; the caller applies the style sheet."""
     widest, (axes,) = page.empty_page(
         f"What is missing from the model: {diagnosis.verdict.replace('_', ' ')}",
-        f"{record}; the model as given misses {percent(diagnosis.comparison.prediction.error)} of the response",
+        f"{record}; the model as fitted misses {percent(diagnosis.comparison.prediction.error)} of the response",
         panel=3.4, legend_rows=0, headed=False, width=(1.4 if diagnosis.comparison.model.named else 1.0) * page.WIDTH,
     )  # fmt: skip
     widest.subplots_adjust(left=0.34)
