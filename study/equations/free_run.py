@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from threading import Lock
 
 import numpy as np
 
 from study.equations import kernels
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import MotionProgram, motion_program
-from study.records.interpolation import between_runs, between_samples, in_columns, runs_of
+from study.records.interpolation import between_runs, between_samples_kept, in_columns, runs_of
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
@@ -264,7 +263,7 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
         return _along_stretches(record, span, driving, factor)
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
-    columns = [_between(record[name], factor, record.reading(name))[part] for name in driving]
+    columns = [_kept(record[name], factor, record.reading(name))[part] for name in driving]
     drive = in_columns(columns, factor * (last - first))
     return drive, ((0, record.start + first * record.dt),), None
 
@@ -285,29 +284,15 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
         return drive, tuple(starts), places
 
     size = 8 * (len(record) * len(record.channels) + (span[1] - span[0]) * (1 + factor * len(driving)))
-    with _ONE_AT_A_TIME:
-        return _MOTIONS.get((record, span, driving, factor), size, made)
-
-
-def _between(values: Floats, factor: int, reading: str) -> Floats:
-    """A channel between its samples; threads wait for each other: two fits of one record ask for the same."""
-    with _ONE_AT_A_TIME:
-        return _kept(values, factor, reading)
+    return _MOTIONS.get((record, span, driving, factor), size, made)
 
 
 def _kept(values: Floats, factor: int, reading: str) -> Floats:
-    """The same for whoever has waited; a diagnosis makes hundreds of runs under the same force."""
-    own = values.tobytes()
-
-    def made() -> Floats:
-        fine = between_samples(np.frombuffer(own), factor, reading)
-        fine.flags.writeable = False
-        return fine
-
-    return _FORCES.get((own, factor, reading), len(own) * (1 + factor), made)
+    """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
+    return between_samples_kept(_FORCES, values, factor, reading)
 
 
-_FORCES, _MOTIONS, _ONE_AT_A_TIME = Recent(), Recent(), Lock()
+_FORCES, _MOTIONS = Recent(), Recent()
 
 
 def predict_response(

@@ -13,6 +13,7 @@ from scipy.fft import irfft, rfft
 from study.records.completion import CONTINUED
 from study.records.record import Record, Stretch
 from study.support.arrays import Floats, Ints
+from study.support.recent import Recent
 
 BAND_LIMITED = "band_limited"
 BETWEEN_SAMPLES = (BAND_LIMITED, "straight", "held")
@@ -43,6 +44,18 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
     longer = _reflected(values)
     edge = (len(longer) - n) // 2
     return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+def between_samples_kept(kept: Recent, values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
+    """As :func:`between_samples`, not to be written to: what was made last is ``kept``, by the values themselves."""
+    own = values.tobytes()
+
+    def made() -> Floats:
+        fine = between_samples(np.frombuffer(own), factor, reading)
+        fine.flags.writeable = False
+        return fine
+
+    return kept.get((own, factor, reading), len(own) * (1 + factor), made)
 
 
 def in_columns(values: Sequence[Floats], n: int) -> Floats:

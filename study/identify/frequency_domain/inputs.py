@@ -16,16 +16,18 @@ from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE, HERE, Place
-from study.records.interpolation import between_samples, in_columns
+from study.records.interpolation import between_samples_kept, in_columns
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
+from study.support.recent import Recent
 
 INERTIA = 2  # order of its time derivative
 LARGEST_INPUT = 1e150  # the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
 MOST_STATE_STEPS = 64  # ... and at most
 AGREED = 0.01  # of a state's rms: what other steps may change
+_ALONG_MOTIONS = Recent()  # between samples: a search asks for states with many shape parameters along one motion
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ def input_history(item: Input, record: Record) -> Floats:
     memory = memory_program(formula, dict(item.parameters), [name for name in wanted if name != "t"])
 
     def integrated(steps: int) -> Floats:
-        fine = [between_samples(data[name], 2 * steps) for name in memory.drive]
+        fine = [between_samples_kept(_ALONG_MOTIONS, data[name], 2 * steps) for name in memory.drive]
         drive = in_columns(fine, 2 * steps * len(record))
         states, out = np.zeros((1, 1, 1)), np.full((len(record), 1, 1), np.nan)
         start, bounds = np.array([record.time[0]]), np.array([0, len(record)])
