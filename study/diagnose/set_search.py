@@ -16,7 +16,7 @@ from study.equations.model import ModelTerm
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import TRIED, grown_states
 from study.identify.time_domain.part_fit import fit_part
-from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.shape_search import Baseline, Start
 from study.support import statistics
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
@@ -55,15 +55,15 @@ class SetSearch:
             if progress is not None:
                 progress(before + count, before + len(listed), f"sets of {max(len(start.names) for start in listed)}")
 
-    def fitted(self, start: SetStart) -> FittedCandidate | None:
-        """One set, fitted; None where it has no finite motion. Nothing is kept of it."""
+    def fitted(self, start: SetStart, held: Sequence[str] = ()) -> FittedCandidate | None:
+        """One set, fitted with some coefficients held; None where it has no finite motion. Nothing is kept of it."""
         prepared, begun = self.base.prepared, self.base.fit if start.beside is None else start.beside.fit
         own = begun.held if start.model.modal else self.base.fit.held  # modes that damping does not couple stay so
         try:
             fit = fit_part(
                 start.model,
                 prepared,
-                [k for k in own if k in start.model.values],
+                [*(k for k in own if k in start.model.values), *held],
                 steps=max(self.base.fit.steps_per_sample, begun.steps_per_sample),
                 max_iterations=TRIED,
                 initial=None if begun.restarts else grown_states(begun, start.model),  # segments have their own
@@ -195,7 +195,7 @@ def _exchange(
 
 
 def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) -> None:
-    """From above: fit all simple effects at once, then the few that do as much, and what has a shape beside these.
+    """From above: fit all simple effects at once and flexible ones beside them, then the few that do as much.
 
     Where several effects act at once a wrong one may stand for two of them, and what is grown on it misses both. Beside
     all others an effect shows what is its own, and the motion is nearly the true one: there the sensitivities tell
@@ -205,12 +205,18 @@ def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) 
     whole = _whole(search, min(plain, key=by_power)) if plain else None
     if whole is None:
         return
-    starts = set_screening.by_sensitivities(whole, search.offered, search.base, sizes, EACH, moved=True)
+    larger = [whole, *_with_shapes(search, whole)]
+    if len(larger) > 1:
+        larger += _with_shapes(search, larger[1])[:1]
+    for every in larger:
+        asked = search.offered | {entry.name: entry for entry in every.fit.model.terms if entry.name in every.names}
+        starts = set_screening.by_sensitivities(every, asked, search.base, sizes, EACH, moved=True)
+        for size in sizes:
+            search.fit(starts[size], progress)
+    found = [(every.names, entry) for every in larger for entry in every.fit.model.terms]
+    shaped = {entry.name: entry for names, entry in found if entry.name in names and unknowns_of(entry) > 1}
     for size in sizes:
-        search.fit(starts[size], progress)
-    offer_beside(search, min((c for c in search.tried.values() if not c.flexible), key=by_power), simple=False)
-    for size in sizes:
-        _exchange(search, search.offered, size, simple=False, progress=progress)
+        _exchange(search, search.offered | shaped, size, simple=False, progress=progress)
 
 
 def _whole(search: SetSearch, beside: FittedCandidate) -> FittedCandidate | None:
@@ -221,6 +227,27 @@ def _whole(search: SetSearch, beside: FittedCandidate) -> FittedCandidate | None
             model = model.with_term(replace(entry, coefficients=(0.0,) * len(entry.symbols)))
             names.append(name)
     return search.fitted(SetStart(frozenset(names), model, beside))
+
+
+def _with_shapes(search: SetSearch, whole: FittedCandidate) -> list[FittedCandidate]:
+    """The sets with one flexible effect more, of those that promise most; the best two."""
+    base = shape_search.baseline(whole.fit, search.base.prepared)
+    entries = [e for e in search.entries.values() if unknowns_of(e) > 1 and e.name not in whole.names]
+    begun = zip(entries, side_by_side(lambda e: shape_search.shape_starts(e, base), entries), strict=True)
+    promising = sorted((pair for pair in begun if pair[1]), key=lambda pair: -pair[1][0].share)[:3]
+    starts = [(entry, point) for entry, points in promising for point in points[:2]]
+    found = list(filter(None, side_by_side(lambda start: _shaped(search, whole, *start), starts)))
+    best = {c.names: c for c in sorted(found, key=by_power, reverse=True)}  # of two starts the better end
+    return sorted(best.values(), key=by_power)[:2]
+
+
+def _shaped(search: SetSearch, whole: FittedCandidate, entry: ModelTerm, point: Start) -> FittedCandidate | None:
+    """A set with a flexible effect more: fitted with its shape held first, as its misfit has kinks along that."""
+    amounts = point.coefficients or (0.0,) * len(entry.symbols)
+    model = whole.fit.model.with_term(replace(entry, coefficients=amounts, parameters=point.parameters))
+    names, shape = frozenset((*whole.names, entry.name)), entry.keys[len(entry.symbols) :]
+    begun = search.fitted(SetStart(names, model, whole), held=shape)
+    return None if begun is None else search.fitted(SetStart(names, begun.fit.model, begun))
 
 
 def gains(smaller: FittedCandidate, larger: FittedCandidate, asked: int) -> bool:

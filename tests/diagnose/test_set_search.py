@@ -334,6 +334,7 @@ def test_what_grows_astray_is_found_from_above(monkeypatch: pytest.MonkeyPatch):
 
     every = candidate(NAMES, {})
     monkeypatch.setattr(set_search, "_whole", lambda *_: every)
+    monkeypatch.setattr(set_search, "_with_shapes", lambda *_: [])
     assert found(from_above=False)[0] != "abcd"
     assert found(from_above=True) == ("abcd", [every.name])
 
