@@ -20,7 +20,7 @@ from study.equations.model import ModelTerm
 from study.equations.place import Place
 from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import BEYOND_MEASURE, judging_run, run_of, with_states
+from study.identify.time_domain.part_fit import judging_run, run_of, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline, baseline, modulation_lines, residual_lines
 from study.records.prepared import Prepared
@@ -30,6 +30,7 @@ from study.support import statistics
 from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import Factored, factored, least_squares
+from study.support.numbers import BEYOND_MEASURE
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 

@@ -17,7 +17,7 @@ from study.equations.term import Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_range import idle_effects
-from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
+from study.identify.time_domain.shape_search import Baseline, Screened, Start, starts_of
 from study.identify.time_domain.smoothness import with_all_knots
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
@@ -120,7 +120,8 @@ def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | N
     Of two sides of a place the better stays.
     """
     if not base.several:
-        return _fitted([Screened(entry) for entry in entries], base, progress)
+        begins = zip(entries, starts_of(entries, base), strict=True)
+        return _fitted([Screened(entry, tuple(points)) for entry, points in begins], base, progress)
     ordered = screened(entries, base)
     chosen = worth_fitting(ordered)
     tried = _fitted(chosen, base, progress)
@@ -129,11 +130,7 @@ def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | N
 
 def screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:
     """Candidates with the points that explain most, the most promising first; those that explain nothing left out."""
-
-    def points(entry: ModelTerm) -> Screened:
-        return Screened(entry, tuple(shape_starts(entry, base)))
-
-    tried = side_by_side(points, entries, lambda entry: entry.term.effort)
+    tried = [Screened(e, tuple(points)) for e, points in zip(entries, starts_of(entries, base), strict=True)]
     return sorted((item for item in tried if item.points and item.share > 0.0), key=lambda item: -item.share)
 
 

@@ -17,7 +17,7 @@ from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.linear_start import FAINT
 from study.identify.time_domain.part_fit import with_states
-from study.identify.time_domain.shape_search import CUTOFF, Baseline, sensitivity
+from study.identify.time_domain.shape_search import CUTOFF, Baseline, sensitivities
 from study.identify.time_domain.told_alone import is_alone, model_alone, prepared_alone
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -98,11 +98,10 @@ def by_sensitivities(
     for at in amounts.values():
         target += jacobian[:, at] @ fit.values[at]
     here = replace(base, fit=fit, basis=basis)
-    for name, entry in offered.items():
-        if name not in columns:
-            added = sensitivity(entry, tuple(float(p or 0.0) for p in entry.parameters), here)
-            if added is not None:
-                columns[name] = added
+    more = {name: entry for name, entry in offered.items() if name not in columns}
+    points = [(entry, tuple(float(p or 0.0) for p in entry.parameters)) for entry in more.values()]
+    found = zip(more, sensitivities(points, here), strict=True)
+    columns |= {name: added for name, added in found if added is not None}
     known = fit.model.numbers()
 
     def started(names: frozenset[str]) -> SetStart:

@@ -233,7 +233,7 @@ def _with_shapes(search: SetSearch, whole: FittedCandidate) -> list[FittedCandid
     """The sets with one flexible effect more, of those that promise most; the best two."""
     base = shape_search.baseline(whole.fit, search.base.prepared)
     entries = [e for e in search.entries.values() if unknowns_of(e) > 1 and e.name not in whole.names]
-    begun = zip(entries, side_by_side(lambda e: shape_search.shape_starts(e, base), entries), strict=True)
+    begun = zip(entries, shape_search.starts_of(entries, base), strict=True)
     promising = sorted((pair for pair in begun if pair[1]), key=lambda pair: -pair[1][0].share)[:3]
     starts = [(entry, point) for entry, points in promising for point in points[:2]]
     found = list(filter(None, side_by_side(lambda start: _shaped(search, whole, *start), starts)))

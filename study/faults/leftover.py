@@ -384,8 +384,8 @@ def missing(left: FittedResidual) -> FittedResidual | None:
             return None
         return leftover(fit, prepared)
 
-    begins = side_by_side(lambda e: shape_search.shape_starts(e, base), entries, lambda e: e.term.effort)
-    starts = [(entry, found) for entry, found in zip(entries, begins, strict=True) if found]
+    begins = zip(entries, shape_search.starts_of(entries, base), strict=True)
+    starts = [(entry, found) for entry, found in begins if found]
     promising = sorted(starts, key=lambda s: -s[1][0].share)[:STRONGEST]
     tried = [t for t in side_by_side(fitted, promising, lambda begun: begun[0].term.effort) if t is not None]
     for group in ([t for t in tried if not unphysical(t, left)], tried):

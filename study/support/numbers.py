@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 SMALLEST, LARGEST = 1e-50, 1e50  # of a value: no unit makes one beyond, and the square of one beyond may be no number
+BEYOND_MEASURE = 1e150  # of what is computed: the square of one beyond may be no number
 LAST_DIGITS = 1e-9  # relative: what two numbers that were written, converted or added up may differ by and be one
 SAME_RUN = 0.01  # relative: what numbers of two runs of the same code on two machines may differ by
 RARE = 0.001  # of chances: nobody needs the digits of a smaller one

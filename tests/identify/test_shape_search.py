@@ -5,9 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from study import trials
+from study.equations.kernels import WRITTEN_OUT
 from study.equations.model import free
+from study.equations.possible_effects import candidate_entries
 from study.equations.terms import LIBRARY, get
-from study.identify.time_domain import shape_search
+from study.identify.time_domain import part_fit, shape_search
+from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.shape_search import Baseline
+from study.records.prepared import prepare_record
 
 DT, N = 0.02, 4096
 TIME = DT * np.arange(N)
@@ -72,3 +78,45 @@ def test_the_pitch_of_a_force_is_that_of_the_residual_over_the_displacement(pitc
 @pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])
 def test_a_term_without_shape_parameters_is_tried_once(name: str, base: SimpleNamespace) -> None:
     assert shape_search.points_to_try(free(get(name)), U, base) == [()]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Baseline:
+    """A linear model beside which two effects are missing."""
+    made = trials.make_trial(94181, ("cubic_stiffness", "quadratic_damping"), 0.01, "displacement")
+    prepared = prepare_record(made.record).shortened(2048)
+    return shape_search.baseline(fit_model(made.believed, prepared), prepared)
+
+
+def test_effects_along_one_run_are_seen_as_along_runs_of_their_own(fitted: Baseline, monkeypatch: pytest.MonkeyPatch):
+    entries = candidate_entries(fitted.fit.model)
+    alone = [shape_search.shape_starts(entry, fitted) for entry in entries]
+    runs: list[tuple[str, ...]] = []
+
+    def seen(fit, prepared, keys=(), **options):
+        runs.append(tuple(keys))
+        return part_fit.run_of(fit, prepared, keys, **options)
+
+    monkeypatch.setattr(shape_search, "run_of", seen)
+    together = shape_search.starts_of(entries, fitted)
+    assert any(together)
+    for one, other in zip(alone, together, strict=True):
+        assert [start.parameters for start in one] == [start.parameters for start in other]
+        np.testing.assert_allclose([s.share for s in one], [s.share for s in other], atol=1e-9)
+    assert max(map(len, runs)) > 5
+    assert max(1 + len(keys) for keys in runs) <= WRITTEN_OUT
+    friction = [entry.symbols for entry in entries if "friction" in entry.term.name]
+    assert len(friction) > 1
+    for symbols in friction:  # at whose reversals steps are cut
+        assert all(keys == symbols for keys in runs if set(symbols) & set(keys))
+
+
+def test_what_does_not_run_takes_nothing_from_what_it_stands_beside(fitted: Baseline):
+    short, gap = free(get("relaxation")), free(get("dead_band"))
+    width = float(np.std(fitted.motion[0]))
+    none, seen = shape_search.sensitivities([(short, (1e-9,)), (gap, (width,))], fitted)
+    alone = shape_search.sensitivity(gap, (width,), fitted)
+    assert none is None
+    assert seen is not None
+    assert alone is not None
+    np.testing.assert_allclose(seen, alone, rtol=1e-9)

@@ -20,10 +20,10 @@ from study.records.interpolation import between_samples_kept, in_columns
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
+from study.support.numbers import BEYOND_MEASURE
 from study.support.recent import Recent
 
 INERTIA = 2  # order of its time derivative
-LARGEST_INPUT = 1e150  # the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
 MOST_STATE_STEPS = 64  # ... and at most
 AGREED = 0.01  # of a state's rms: what other steps may change
@@ -208,7 +208,7 @@ def _alone(part: Record) -> Record:
 
 def _finite(values: Floats, item: Input, record: Record) -> Floats:
     with np.errstate(invalid="ignore"):
-        bad = np.flatnonzero(~(np.abs(values) < LARGEST_INPUT))
+        bad = np.flatnonzero(~(np.abs(values) < BEYOND_MEASURE))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
         raise StudyError(

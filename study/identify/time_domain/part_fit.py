@@ -16,9 +16,9 @@ from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import RELATIVE_OFFSET
+from study.support.numbers import BEYOND_MEASURE
 from study.support.statistics import clustered_covariance
 
-BEYOND_MEASURE = 1e150
 SEARCH_STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 
 

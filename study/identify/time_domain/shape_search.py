@@ -10,13 +10,16 @@ its linear part is a sum of modes, which has none, modes that are fitted to the 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.free_run import needed_steps
+from study.equations.kernels import WRITTEN_OUT
 from study.equations.linear_part import transfer
 from study.equations.model import Model, ModelTerm
+from study.equations.motion_program import motion_program
 from study.equations.place import Place
 from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.modal_lines import left_of_lines
@@ -29,9 +32,11 @@ from study.records.interpolation import between_samples
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
+from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
 
+Point = tuple[ModelTerm, tuple[float, ...]]  # a candidate and values of its shape parameters
 SEARCH_PERIODS, SEARCH_SAMPLES = 100.0, 2048  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 MODULATION, PITCHES = "lines of the modulation", "pitches of the residual"  # of the kinds of spectra that are tried
@@ -156,24 +161,42 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
 
 
 def shape_starts(entry: ModelTerm, base: Baseline) -> list[Start]:
-    """The best points of the search over a candidate's shape parameters, best first.
+    """The best points of the search over a candidate's shape parameters, best first."""
+    return starts_of([entry], base)[0]
 
-    A single mass is asked by the sensitivities of its free run, one run a point, and so is a component, whose run costs
-    little. Where a structure has several places a free run each is too much, and the reverse system is asked.
+
+def starts_of(entries: Sequence[ModelTerm], base: Baseline) -> list[list[Start]]:
+    """The same of each of several candidates.
+
+    A single mass is asked by the sensitivities of its free run, and so is a component, whose run costs little. Where a
+    structure has several places a free run for each is too much, and the reverse system is asked.
     """
-    if base.fit.model.modal:
-        return _along_lines(entry, base)
-    if base.several and not base.prescribed:
-        u = base.reverse.record(entry.place)["displacement"]
-        found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
-        return sorted((point for point in found if point is not None), key=lambda s: -s.share)
-    points = (_try(entry, parameters, base) for parameters in points_to_try(entry, base.along(entry.place), base))
-    tried = [point for point in points if point is not None]
+    if base.several and (base.fit.model.modal or not base.prescribed):
+        asked = _along_lines if base.fit.model.modal else _in_reverse
+        return list(side_by_side(lambda entry: asked(entry, base), entries, lambda entry: entry.term.effort))
+    points = [points_to_try(entry, base.along(entry.place), base) for entry in entries]
+    every = [(i, point) for turn in zip_longest(*points) for i, point in enumerate(turn) if point is not None]
+    tried: list[list[Start]] = [[] for _ in entries]
+    for (i, point), added in zip(every, sensitivities([(entries[i], p) for i, p in every], base), strict=True):
+        if added is not None:
+            tried[i].append(explained_by(added, base.fit.residual, point))
+    return [_best(*both) for both in zip(entries, tried, strict=True)]
+
+
+def _best(entry: ModelTerm, tried: Sequence[Start]) -> list[Start]:
+    """Of the points of the search those that start a fit."""
     best = sorted(tried, key=lambda s: -s.share)
     if not any(p.search.blunt for p in entry.term.parameters):
         return best[:STARTS]
     step = max(1, (len(tried) - 1) // (SPREAD - 1))
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
+
+
+def _in_reverse(entry: ModelTerm, base: Baseline) -> list[Start]:
+    """The points for a candidate beside the equations of all coordinates, by the share that it explains of them."""
+    u = base.reverse.record(entry.place)["displacement"]
+    found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
+    return sorted((point for point in found if point is not None), key=lambda s: -s.share)
 
 
 def _along_lines(entry: ModelTerm, base: Baseline) -> list[Start]:
@@ -193,25 +216,62 @@ def sensitivity(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline)
 
     Shape (n s, components). None where the model with it does not run, or nothing is left.
     """
-    prepared = base.prepared
-    given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
-    model = base.fit.model.with_term(given)
-    steps = base.fit.steps_per_sample
+    return sensitivities([(entry, parameters)], base)[0]
+
+
+def sensitivities(points: Sequence[Point], base: Baseline) -> list[Floats | None]:
+    """The same of many candidates and shape parameters, those of different candidates along one free run.
+
+    Each is there with an amount of zero, so that the motion is the model's own whatever stands beside it. Not so where
+    one brings dry friction along, at whose reversals steps are cut: that runs by itself.
+    """
+    by_itself = {e.name: base.prescribed or _cuts_steps(e, base) for e in {e.name: e for e, _ in points}.values()}
+    runs: list[list[int]] = []
+    for i, (entry, _) in enumerate(points):
+        there = ([points[at][0] for at in run] for run in runs)
+        room = (not by_itself[entry.name] and not by_itself[e[0].name] and _has_room(e, entry) for e in there)
+        run = next((run for run, free in zip(runs, room, strict=True) if free), None)
+        if run is None:
+            runs.append([i])
+        else:
+            run.append(i)
+    found = side_by_side(lambda run: _along_one_run([points[i] for i in run], base), runs)
+    by_point = dict(pair for run, every in zip(runs, found, strict=True) for pair in zip(run, every, strict=True))
+    return [by_point[i] for i in range(len(points))]
+
+
+def _has_room(there: Sequence[ModelTerm], entry: ModelTerm) -> bool:
+    """Whether a run takes one candidate more, another than those that are there."""
+    columns = 1 + sum(len(other.symbols) for other in (*there, entry))
+    return columns <= WRITTEN_OUT and entry.name not in {other.name for other in there}
+
+
+def _cuts_steps(entry: ModelTerm, base: Baseline) -> bool:
+    """Whether a candidate brings dry friction to a model that has none there."""
+    own, grown = (
+        len(motion_program(model, tuple(model.values), base.fit.outputs.sensors).sides)
+        for model in (base.fit.model, base.fit.model.with_term(entry))
+    )
+    return grown > own
+
+
+def _along_one_run(points: Sequence[Point], base: Baseline) -> list[Floats | None]:
+    """Sensitivities along one run; by themselves where all together do not run."""
+    prepared, model, steps = base.prepared, base.fit.model, base.fit.steps_per_sample
+    symbols = [symbol for entry, _ in points for symbol in entry.symbols]
+    for entry, parameters in points:
+        model = model.with_term(replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters))
     if base.prescribed:  # a loop that closes sharply asks for more than any motion would
         steps = max(steps, needed_steps(model, prepared.record, prepared.outputs))
     try:
-        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, entry.symbols)
-        _, added = run.respond(dict.fromkeys(entry.symbols, 0.0), base.fit.initial)
+        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, symbols)
+        _, added = run.respond(dict.fromkeys(symbols, 0.0), base.fit.initial)
     except StudyError:
-        return None
+        return [None] if len(points) == 1 else [sensitivity(*point, base) for point in points]
     added = prepared.known(prepared.outputs.stacked(added), base.fit.span)
     added = added - base.basis @ (base.basis.T @ added)
-    return added if np.all(np.isfinite(added)) and np.any(added) else None
-
-
-def _try(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline) -> Start | None:
-    added = sensitivity(entry, parameters, base)
-    return None if added is None else explained_by(added, base.fit.residual, parameters)
+    parts = np.split(added, np.cumsum([len(entry.symbols) for entry, _ in points])[:-1], axis=1)
+    return [part if np.all(np.isfinite(part)) and np.any(part) else None for part in parts]
 
 
 def explained_by(added: Floats, residual: Floats, parameters: tuple[float, ...]) -> Start:
