@@ -96,7 +96,10 @@ def answers_panel(axes: Axes, found: NextTest) -> Axes:
 
 
 def evidence_panel(axes: Axes, found: NextTest) -> Axes:
-    """How the squares that each rival leaves of the first one's answer add up, over the noise's variance."""
+    """How the squares that each rival leaves of the first one's answer add up, over the noise's variance.
+
+    Where they come in a few jumps they decide less than their sum says.
+    """
     rivals, choice = found.rivals, found.choice
     outputs, noise = rivals.seen(choice.sensor)
     time = choice.design.record.dt * np.arange(len(choice.design.record))
@@ -107,8 +110,8 @@ def evidence_panel(axes: Axes, found: NextTest) -> Axes:
     needed = (2.0 * (K + float(ndtri(DECIDES)))) ** 2
     axes.axhline(needed, color="0.35", linewidth=0.9)
     axes.annotate(
-        f"decides with {percent(DECIDES, '.0f')}", (1.0, needed), xycoords=("axes fraction", "data"),
-        xytext=(0, -3), textcoords="offset points", ha="right", va="top", fontsize=8,
+        f"decides with {percent(DECIDES, '.0f')}, if it grows evenly", (1.0, needed),
+        xycoords=("axes fraction", "data"), xytext=(0, -3), textcoords="offset points", ha="right", va="top", fontsize=8,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
     )  # fmt: skip
     axes.set_ylim(1.0, max(10.0 * needed, axes.get_ylim()[1]))
