@@ -111,8 +111,8 @@ def evidence_panel(axes: Axes, found: NextTest) -> Axes:
     axes.axhline(needed, color="0.35", linewidth=0.9)
     axes.annotate(
         f"decides with {percent(DECIDES, '.0f')}, if it grows evenly", (1.0, needed),
-        xycoords=("axes fraction", "data"), xytext=(0, -3), textcoords="offset points", ha="right", va="top", fontsize=8,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        xycoords=("axes fraction", "data"), xytext=(0, -3), textcoords="offset points", ha="right", va="top",
+        fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
     )  # fmt: skip
     axes.set_ylim(1.0, max(10.0 * needed, axes.get_ylim()[1]))
     axes.set_ylabel("evidence")
