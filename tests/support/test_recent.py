@@ -25,3 +25,11 @@ def test_no_more_results_are_kept_than_asked() -> None:
     for key in (1, 2, 3, 2, 3, 1):
         kept.get(key, 0, lambda key=key: made.append(key))
     assert made == [1, 2, 3, 1]
+
+
+def test_what_is_larger_than_asked_is_made_anew() -> None:
+    kept, made = Recent(room=10, largest=4), list[int]()
+    for size in (5, 4, 5, 4):
+        kept.get(size, size, lambda size=size: made.append(size))
+    assert made == [5, 4, 5]
+    assert kept.size == 4

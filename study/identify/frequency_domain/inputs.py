@@ -27,7 +27,8 @@ INERTIA = 2  # order of its time derivative
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
 MOST_STATE_STEPS = 64  # ... and at most
 AGREED = 0.01  # of a state's rms: what other steps may change
-_ALONG_MOTIONS = Recent()  # between samples: a search asks for states with many shape parameters along one motion
+# Between samples: a search, of thousands of samples, asks for states with many shape parameters along one motion.
+_ALONG_MOTIONS = Recent(largest=1 << 23)
 
 
 @dataclass(frozen=True)
