@@ -41,7 +41,7 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[S
 
         def step(doing: str, to_come: int | None = None) -> None:
             if doing:
-                bar.set_description(harmless(doing), refresh=False)
+                bar.set_description_str(harmless(doing), refresh=False)  # tqdm adds the colon
             if to_come is not None:
                 bar.total = bar.n + 1 + to_come
             elif bar.total is not None:
