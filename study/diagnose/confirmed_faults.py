@@ -1,15 +1,17 @@
 """Faults of the measurement in the light of a diagnosis."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
+from study.diagnose.held_values import contradicted, held_coefficients, saying_so
 from study.diagnose.late_force import late_force
 from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import Fault
+from study.support import statistics
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
 
@@ -47,6 +49,9 @@ def diagnose_accounted(
     if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
         accounted = accounted.with_all_faults()
         first = found(accounted) if accounted.faults != first.accounted.faults else first
+    freed = _with_values_let_go(first, found)
+    if freed is not None:
+        first, accounted = freed, freed.accounted
     removable = any(f.corrected and not _plain(f) for f in accounted.faults)
     if removable and first.diagnosis.verdict == UNKNOWN:
         other = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
@@ -72,6 +77,29 @@ def diagnose_accounted(
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _with_values_let_go(first: Diagnosed, found: Callable[[Accounted], Diagnosed]) -> Diagnosed | None:
+    """The diagnosis with values let go that the record contradicts once its faults are looked for beside them as well.
+
+    A value that is wrong looks like a fault, and the record that is corrected for that contradicts it no longer. None
+    where no fault rests on what the model holds, nothing is contradicted, or more is left so.
+    """
+    comparison = first.accounted.comparison
+    keys = held_coefficients(comparison)
+    if not keys or all(map(_plain, first.accounted.faults)):
+        return None
+    try:
+        told = found(first.accounted.beside(comparison.model.with_values(dict.fromkeys(keys))))
+        wrong = contradicted(keys, told.diagnosis, comparison)
+        if 0 < len(wrong) < len(keys):
+            told = found(first.accounted.beside(comparison.model.with_values(dict.fromkeys(wrong))))
+    except StudyError:
+        return None
+    one, other = ((d.diagnosis.answer or d.diagnosis.comparison).prediction.residual for d in (told, first))
+    if not wrong or statistics.worse(one, other) >= K:
+        return None
+    return replace(told, diagnosis=saying_so(told.diagnosis, wrong, comparison))
 
 
 def _plain(fault: Fault) -> bool:

@@ -40,20 +40,20 @@ def diagnose_with_values_let_go(
     others fitted, and its notes say so.
     """
     found = diagnose(comparison, extra=extra, without=without, progress=progress)
-    keys = _coefficients(comparison)
+    keys = held_coefficients(comparison)
     best = next(iter([*found.sets, *found.candidates]), None)
     if found.verdict == NOTHING or best is None or not keys or not _stand_in(keys, best, comparison):
         return found
     diagnosed = partial(diagnose, extra=extra, without=without, progress=progress)
     try:
         freed = diagnosed(_let_go(comparison, keys))
-        wrong = _contradicted(keys, freed, comparison)
+        wrong = contradicted(keys, freed, comparison)
         if not wrong:
             return found
         told = freed if len(wrong) == len(keys) else diagnosed(_let_go(comparison, tuple(wrong)))
     except StudyError:
         return found
-    return replace(told, comparison=replace(told.comparison, notes=(*told.comparison.notes, _note(wrong, comparison))))
+    return saying_so(told, wrong, comparison)
 
 
 def _let_go(comparison: Comparison, keys: Sequence[str]) -> Comparison:
@@ -61,7 +61,7 @@ def _let_go(comparison: Comparison, keys: Sequence[str]) -> Comparison:
     return compare(comparison.model.with_values(dict.fromkeys(keys)), comparison.prepared)
 
 
-def _coefficients(comparison: Comparison) -> tuple[str, ...]:
+def held_coefficients(comparison: Comparison) -> tuple[str, ...]:
     """Coefficients that the model holds and that the record tells of; of free decays ratios to the mass alone."""
     model = comparison.model
     if model.modal:
@@ -86,25 +86,27 @@ def _stand_in(keys: Sequence[str], best: Ranked, comparison: Comparison) -> bool
     return False
 
 
-def _contradicted(
+def contradicted(
     keys: Sequence[str], freed: Diagnosis, comparison: Comparison
 ) -> dict[str, tuple[float, float]]:  # fmt: skip
     """Values, with standard errors, of those that are others than the model holds, beside what is missing."""
-    fit, prepared = (freed.answer or freed.comparison).fit, comparison.prepared
+    fit, prepared = (freed.answer or freed.comparison).fit, freed.comparison.prepared
     errors = np.sqrt(np.diag(uncertainty(fit, prepared, *run_and_slopes(fit, prepared))))
     found = zip(fit.keys, fit.values.tolist(), errors.tolist(), strict=False)  # behind them those of initial states
     given = comparison.fit.model.numbers()  # what is held is as given
     return {key: (value, e) for key, value, e in found if key in keys and abs(value - given[key]) > K * e}
 
 
-def _note(wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> str:
+def saying_so(told: Diagnosis, wrong: Mapping[str, tuple[float, float]], comparison: Comparison) -> Diagnosis:
+    """A diagnosis whose notes say which values were let go, and what was left with them."""
     held = {c.key: c for c in comparison.coefficients}
     each = [
         f"{key} is {value:.4g} +- {error:.2g}{held[key].unit and f' {held[key].unit}'}, not {held[key].value:.4g}"
         for key, (value, error) in wrong.items()
     ]
     left = percent(comparison.prediction.error)
-    return (
+    note = (
         f"{CONTRADICTED}: {enumerated(each)}; with that held {left} of the response is left (no value, or held: false, "
         "in the model file fits it)"
     )
+    return replace(told, comparison=replace(told.comparison, notes=(*told.comparison.notes, note)))

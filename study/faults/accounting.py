@@ -76,6 +76,11 @@ class Accounted:
         model, known, off = self.comparison.model, self.known, self.switched_off
         return _accounted(model, self.given, known, off, FREE_RUN, None, self.as_sampled, changes=False)
 
+    def beside(self, model: Model) -> "Accounted":
+        """The same of another model, with the faults that the record shows beside it."""
+        known, off = self.known, self.switched_off
+        return _accounted(model, self.given, known, off, FREE_RUN, None, self.as_sampled, changes=True)
+
     def corrected_for(self, faults: Sequence[Fault]) -> "Accounted":
         """The comparison of the same model with the record corrected for other faults."""
         prepared = _needed(self.as_sampled)(corrected(self.given, faults))

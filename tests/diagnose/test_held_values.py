@@ -16,6 +16,9 @@ from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
 from study.explore import session as sessions
+from study.faults.accounting import accounted
+from study.faults.correction import corrected
+from study.faults.fault import Fault
 from study.records.prepared import prepare_record
 from study.records.record import Record
 
@@ -100,3 +103,26 @@ def test_what_is_added_on_the_page_is_added_beside_the_value_that_was_let_go(mon
     promised = session.now.diagnosis.answer.response_error if session.now.diagnosis.answer else None
     grown = sessions.with_added(session, "cubic_stiffness")
     assert grown.now.comparison.prediction.error == pytest.approx(promised, rel=0.02)
+
+
+@pytest.mark.long
+def test_a_wrong_value_that_looks_like_a_fault_is_told_and_the_fault_is_not(monkeypatch: pytest.MonkeyPatch):
+    """Corrected for a gain that seems to grow, the record contradicts the mass no longer."""
+    begun = accounted(model(inertia=2.05), record())
+    found = confirmed_faults.diagnose_accounted(begun, without=WITHOUT)
+    monkeypatch.setattr(confirmed_faults, "_with_values_let_go", lambda *_: None)
+    assert confirmed_faults.diagnose_accounted(begun, without=WITHOUT).faults
+    assert found.diagnosis.verdict == NOTHING
+    assert found.faults == ()
+    (said,) = contradicted(found.diagnosis)
+    assert "not 2.05" in said
+
+
+@pytest.mark.long
+def test_a_fault_that_is_there_is_told_beside_a_value_that_is_let_go():
+    late = corrected(record(), [Fault("delay", "displacement", -0.4)])
+    found = confirmed_faults.diagnose_accounted(accounted(model(linear_damping=2.5), late), without=WITHOUT)
+    assert found.diagnosis.verdict == NOTHING
+    assert [fault.fault for fault in found.faults] == ["delay"]
+    assert found.faults[0].value == pytest.approx(0.4, abs=0.01)
+    assert "not 2.5" in contradicted(found.diagnosis)[0]
