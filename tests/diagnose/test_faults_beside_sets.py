@@ -93,6 +93,7 @@ def diagnosed(
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
+    monkeypatch.setattr(confirmed_faults, "held_coefficients", lambda _: ())
     return diagnose_accounted(record), len(made)
 
 
