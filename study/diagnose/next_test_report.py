@@ -140,6 +140,9 @@ def precise_test_in_words(found: PreciseTest) -> str:
     said = f"{test[0].upper()}{test[1:]}, brings the 95 % interval of {found.key} to +- {percent(found.width)} of it"
     again = "" if math.isnan(found.again) else f"; a repetition of this record's test, +- {percent(found.again)}"
     said += f" (now +- {percent(found.now)}{again})."
+    if found.now <= found.wanted:
+        known, asked = percent(found.now), percent(found.wanted)
+        said = f"This record tells {found.key} to +- {known} of it already, and {asked} is asked for. {said}"
     if found.width > found.wanted:
         said += f" Of {found.asked} tests within the limits none brings it to {percent(found.wanted)}."
     return said

@@ -178,6 +178,8 @@ def test_an_interval_becomes_as_narrow_as_was_said(trial, rivals):
     at = both.keys.index(key)
     assert found.width == pytest.approx(1.96 * float(np.sqrt(both.covariance[at, at])) / found.value, rel=0.25)
     assert "95 % interval" in precise_plan(found)[0]
+    assert "already" not in precise_plan(found)[0]
+    assert f"tells {key} to +- " in precise_plan(replace(found, wanted=2.0 * now))[0]  # and no test is needed
 
 
 def test_nothing_pulls_at_what_stands_on_a_table_whose_acceleration_is_written(rivals):
