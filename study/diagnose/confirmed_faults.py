@@ -37,13 +37,20 @@ def diagnose_accounted(
     without what the model alone told of its faults. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
+    made: list[Diagnosed] = []
 
     def found(one: Accounted) -> Diagnosed:
-        diagnosis = diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
+        done = next((d for d in made if _of_the_same(d.accounted, one)), None)
+        diagnosis = (
+            diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
+            if done is None
+            else _saying(done, one)
+        )
         faults = one.faults
         if diagnosis.comparison.model is not one.comparison.model:  # seen beside values that are let go
             faults = still_seen(faults, diagnosis.comparison.fit, diagnosis.comparison.prepared)
-        return Diagnosed(diagnosis, one, confirmed(faults, diagnosis))
+        made.append(Diagnosed(diagnosis, one, confirmed(faults, diagnosis)))
+        return made[-1]
 
     first = found(accounted)
     if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
@@ -77,6 +84,24 @@ def diagnose_accounted(
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _of_the_same(one: Accounted, other: Accounted) -> bool:
+    """Whether two comparisons are of one model with a record corrected and read in the same way."""
+
+    def of(accounted: Accounted) -> tuple[object, ...]:
+        corrected = {(f.fault, f.channel, f.value) for f in accounted.faults if f.corrected}
+        record = accounted.comparison.record
+        return accounted.comparison.model, corrected, record.between, len(record)
+
+    return of(one) == of(other)
+
+
+def _saying(done: Diagnosed, one: Accounted) -> Diagnosis:
+    """A diagnosis that was made, with what is said of the record now."""
+    own = done.diagnosis.comparison
+    added = [note for note in own.notes if note not in done.accounted.comparison.notes]
+    return replace(done.diagnosis, comparison=replace(own, notes=(*one.comparison.notes, *added)))
 
 
 def _with_values_let_go(first: Diagnosed, found: Callable[[Accounted], Diagnosed]) -> Diagnosed | None:

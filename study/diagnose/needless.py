@@ -75,6 +75,8 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
         system is chaotic.
     """
     keys = comparison.fit.keys  # a term that another estimator than the fit in free run found has none there
+    changing = {t.term.variation.of.name + t.place.suffix for t in comparison.model.terms if t.term.variation}
+    besides = {*besides, *changing}  # what changes is the coefficient of a term that is there
     terms: list[ModelTerm] = [
         t for t in comparison.model.terms if is_open(t) and t.name not in besides and set(t.keys) <= set(keys)
     ]

@@ -93,7 +93,7 @@ def by_power(candidate: FittedCandidate) -> tuple[bool, float]:
 def searched(
     base: Baseline, singles: Sequence[FittedCandidate], settled: Sequence[FittedCandidate],
     asked: Sequence[ModelTerm], done: Callable[[FittedCandidate], bool], fewer_than: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, *, from_above: bool = True,
 ) -> SetSearch:  # fmt: skip
     """Grow sets of effects until one leaves nothing, none gains by one effect more, or they are large enough.
 
@@ -113,7 +113,7 @@ def searched(
     try:
         _grow(search, reverse, sizes, done, fewer_than, progress)
         # of a structure's many places those that were not tried are missing from the whole
-        if not (base.several or done(min(search.tried.values(), key=by_power))):
+        if from_above and not (base.several or done(min(search.tried.values(), key=by_power))):
             _reduce(search, sizes, progress)
         _side_valleys(search, sizes)
     except KeyboardInterrupt:  # what was found so far is there to be told

@@ -175,20 +175,24 @@ def _changing(
     others = tried if tried and as_it_was else candidates.try_all(entries, base, progress)
     changes = varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
     both = [*entries, *suspect.entries]
+    if beside:  # a change that is there gains when it is added: all effects at once are asked for where one does
+        grown = _diagnosis(suspect.comparison, base, [*others, *changes], both, progress, beside=True, from_above=False)
+        if not grown.changes:
+            return grown
     return _diagnosis(suspect.comparison, base, [*others, *changes], both, progress, beside=beside)
 
 
 def _diagnosis(
     comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm],
-    progress: Progress | None, elsewhere: int = 0, *, beside: bool = False,
+    progress: Progress | None, elsewhere: int = 0, *, beside: bool = False, from_above: bool = True,
 ) -> Diagnosis:  # fmt: skip
     """The diagnosis by candidates as fitted; ``elsewhere`` more were asked for of the record laid out anew.
 
-    ``beside`` what explains nearly all alone other effects are asked for too.
+    ``beside`` what explains nearly all alone other effects are asked for too; ``from_above`` all at once as well.
     """
     asked = (len(entries) if base.several else len(tried)) + elsewhere
     rows = rank(with_best_settled(tried, comparison.prepared), comparison, asked)
-    decision = _decide(rows, tried, entries, base, comparison, asked, progress, beside=beside)
+    decision = _decide(rows, tried, entries, base, comparison, asked, progress, beside=beside, from_above=from_above)
     if decision.sets:
         decision = _smooth(decision, comparison, asked)
     families: list[FamilyGain] = []
@@ -262,7 +266,8 @@ class _Decision:
 
 def _decide(
     rows: list[Ranked], tried: Sequence[FittedCandidate], entries: Sequence[ModelTerm], base: Baseline,
-    comparison: Comparison, asked: int, progress: Progress | None, *, beside: bool, search: SetSearch | None = None,
+    comparison: Comparison, asked: int, progress: Progress | None, *, beside: bool, from_above: bool,
+    search: SetSearch | None = None,
 ) -> _Decision:  # fmt: skip
     """One effect that explains everything; else the set that does, as far as the record bears it.
 
@@ -284,11 +289,16 @@ def _decide(
     settled = [] if comparison.model.modal else changed  # the modes of a longer record are others
     known = {c.name for c in tried}
     effects = [entry for entry in entries if entry.term.variation is None or entry.name in known]
-    search = search or searched(base, tried, settled, effects, _leaves_nothing, fewer_than, progress)
+    search = search or searched(
+        base, tried, settled, effects, _leaves_nothing, fewer_than, progress, from_above=from_above
+    )
     deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
     if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
         rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)
-        return _decide(rows, deeper, entries, base, comparison, asked, progress, beside=beside, search=search)
+        return _decide(
+            rows, deeper, entries, base, comparison, asked, progress, beside=beside, from_above=from_above,
+            search=search,
+        )  # fmt: skip
     sets = _ranked_sets(search, rows, comparison, asked)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
