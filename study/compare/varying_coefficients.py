@@ -60,7 +60,6 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
             key = symbol + entry.place.suffix
             own = (key, *entry.symbols[i * each : (i + 1) * each])
             rows = np.hstack([np.ones((len(at), 1)), basis])
-            amounts = np.array([values.get(name, 0.0) for name in own])  # of a term that was dropped the change is left
             fitted = [j for j, name in enumerate(own) if name in place]
             block = covariance[np.ix_([place[own[j]] for j in fitted], [place[own[j]] for j in fitted])]
             spread = np.einsum("ij,jk,ik->i", rows[:, fitted], block, rows[:, fitted])
@@ -73,7 +72,7 @@ def varying_coefficients(fit: FreeRunFit, covariance: Floats, prepared: Prepared
                 step = values[moment], float(np.hypot(own_error, (variation.lasts or 0.0) / np.sqrt(12.0)))
             found.append(
                 VaryingCoefficient(
-                    entry, key, variation.along, unit, at, rows @ amounts,
+                    entry, key, variation.along, unit, at, rows @ np.array([values[name] for name in own]),
                     np.sqrt(np.maximum(spread, 0.0)), coefficient_unit(replace(entry, term=variation.of), symbol,
                     prepared.record), variation.knots, taken.get(entry.name, float(len(entry.keys))), step,
                 )

@@ -122,8 +122,15 @@ def term_at(model: Model, name: str, place: Place | None = None) -> str:
     return own[0]
 
 
+def changing(model: Model) -> dict[str, str]:
+    """Terms whose coefficients change in a model, which cannot be without them, and the terms that say how."""
+    return {t.term.variation.of.name + t.place.suffix: t.name for t in model.terms if t.term.variation}
+
+
 def check_can_go(model: Model, name: str) -> None:
-    """Refuse a term that is not in the model, inertia, and one without which nothing is left to compare."""
+    """Refuse what is not in the model, inertia, what changes in it, and a term without which nothing is left."""
+    change = changing(model).get(name)
+    expect(change is None, f"{change} says how {name} changes; expected that to be dropped first")
     names = [t.name for t in model.terms if t.term.name != "inertia"]
     if not model.named:
         expect(name != "inertia", "inertia cannot be dropped; a free run needs a mass, expected another term")

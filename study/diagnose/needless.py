@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
-from study.diagnose.dropping import fitted_without, removal
+from study.diagnose.dropping import changing, fitted_without, removal
 from study.diagnose.held_out import HeldOut, evidence, held_out, held_out_of, held_out_test
 from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
@@ -75,8 +75,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
         system is chaotic.
     """
     keys = comparison.fit.keys  # a term that another estimator than the fit in free run found has none there
-    changing = {t.term.variation.of.name + t.place.suffix for t in comparison.model.terms if t.term.variation}
-    besides = {*besides, *changing}  # what changes is the coefficient of a term that is there
+    besides = {*besides, *changing(comparison.model)}
     terms: list[ModelTerm] = [
         t for t in comparison.model.terms if is_open(t) and t.name not in besides and set(t.keys) <= set(keys)
     ]

@@ -1,6 +1,7 @@
 """Faults of the measurement and missing effects are asked for in the light of each other; no record is fitted here."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -56,12 +57,33 @@ class Model:
         return Model(*self.names, entry)
 
 
+class Samples:
+    """A record that no test asks for more of than how it is read, and how long it is."""
+
+    between = "band-limited"
+
+    def __len__(self) -> int:
+        return 4096
+
+
+INERTIA, SAMPLES = Model("inertia"), Samples()
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison of that model with that record, and what is said of it."""
+
+    notes: tuple[str, ...]
+    model: Model = INERTIA
+    record: Samples = SAMPLES
+
+
 class Corrected:
     """A record that is corrected for faults, and the faults that it shows beside a fuller model."""
 
     def __init__(self, faults: Sequence[Fault], beside: Sequence[Fault] | StudyError):
         self.faults, self.beside = tuple(faults), beside
-        self.comparison = SimpleNamespace(model=Model("inertia"))
+        self.comparison = Compared(tuple(f"corrected for {fault.fault}" for fault in faults))
         self.asked: list[tuple[str, ...]] = []
         self.otherwise: list[tuple[Fault, ...]] = []  # for what it was corrected in its place
         self.put_off = False
@@ -77,6 +99,17 @@ class Corrected:
         return Corrected(faults, ())
 
 
+@dataclass(frozen=True)
+class Found:
+    """A diagnosis."""
+
+    answer: Any
+    left: float
+    verdict: str
+    changes: bool
+    comparison: Compared
+
+
 def diagnosed(
     monkeypatch: pytest.MonkeyPatch, record: Any, *found: tuple[tuple[str, ...], float, float]
 ) -> tuple[Any, int]:
@@ -89,7 +122,7 @@ def diagnosed(
         answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
         changes = any("_over_" in name for name in names)
         verdict = SEVERAL if names else UNKNOWN
-        return SimpleNamespace(answer=answer, left=left, verdict=verdict, changes=changes, comparison=comparison)
+        return Found(answer, left, verdict, changes, comparison)
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
     monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
@@ -191,12 +224,13 @@ def test_where_the_fuller_model_cannot_be_asked_the_first_diagnosis_stands(monke
 class PutOff(Corrected):
     """A record along which a coefficient seems to change: faults that look like that are yet to be looked for."""
 
-    def __init__(self, hidden: Sequence[Fault]):
+    def __init__(self, hidden: Sequence[Fault], beside: Sequence[Fault] | None = None):
         super().__init__((), ())
-        self.put_off, self.hidden = True, hidden
+        self.comparison = Compared(("faults are put off",))
+        self.put_off, self.hidden, self.shown = True, hidden, hidden if beside is None else beside
 
     def with_all_faults(self) -> Corrected:
-        return Corrected(self.hidden, self.hidden)
+        return Corrected(self.hidden, self.shown)
 
 
 def test_faults_that_look_like_a_change_are_looked_for_where_none_is_named(monkeypatch: pytest.MonkeyPatch):
@@ -210,3 +244,20 @@ def test_a_change_that_is_named_needs_no_fault_in_its_stead(monkeypatch: pytest.
     found, made = diagnosed(monkeypatch, PutOff([delay(1.0)]), (("linear_stiffness_over_time",), 0.0, 0.02))
     assert made == 1
     assert found.accounted.faults == ()
+
+
+def test_a_record_that_is_corrected_as_before_is_not_diagnosed_again(monkeypatch: pytest.MonkeyPatch):
+    """Beside what is missing the fault is none: what was found without it is known, what was said of it is not true."""
+    record = PutOff([delay(1.0)], beside=[])
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.02), (SET, 0.01, 0.05))
+    assert made == 2
+    assert found.accounted.faults == found.faults == ()
+    assert found.diagnosis.answer.response_error == 0.02
+    assert found.diagnosis.comparison.notes == ()
+
+
+def test_with_another_fault_it_is(monkeypatch: pytest.MonkeyPatch):
+    record = PutOff([delay(1.0)], beside=[delay(1.1)])
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.02), (SET, 0.01, 0.05), (SET, 0.01, 0.01))
+    assert made == 3
+    assert [fault.value for fault in found.accounted.faults] == [1.1]

@@ -10,9 +10,11 @@ from study.diagnose import needless as module
 from study.diagnose.adding import added
 from study.diagnose.dropping import compared_without
 from study.diagnose.needless import needless, needless_fields, needless_in_words, of_records
+from study.equations.laid_variations import laid_entry
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import custom, get
+from study.equations.variation import Variation, varying
 from study.records.excitation import displacement_noise
 from study.records.prepared import prepare_record
 from study.records.record import Record
@@ -136,6 +138,17 @@ def test_the_fit_is_spared_only_where_the_loss_is_certain(completed, monkeypatch
     assert [n.name for n in needless(more)] == ["quadratic_stiffness"]
     assert "quadratic_stiffness" in fitted
     assert "linear_stiffness" not in fitted
+
+
+def test_a_term_whose_coefficient_changes_cannot_go(completed):
+    """Without it its change would be one of nothing: the change goes first, though neither is there."""
+    change = varying(Variation(get("quadratic_stiffness"), "time", shape="line"))
+    model = opened(*DUFFING, "quadratic_stiffness").with_term(laid_entry(free(change), completed.prepared))
+    found = compare(model, completed.prepared)
+    assert [n.name for n in needless(found)] == ["quadratic_stiffness_over_time"]
+    with pytest.raises(StudyError, match="quadratic_stiffness_over_time says how quadratic_stiffness changes"):
+        compared_without(found, "quadratic_stiffness")
+    assert "quadratic_stiffness" in compared_without(found, "quadratic_stiffness_over_time").model
 
 
 def test_of_several_records_all_must_do_without(completed):

@@ -99,12 +99,13 @@ class Bench:
 
     def search(
         self, *, done: bool = False, fewer_than: int | None = None, lost: str = "", progress: Any = None,
-        from_above: bool = False,
+        from_above: bool = False, several: bool | None = None,
     ) -> SetSearch:  # fmt: skip
-        """``lost`` are effects without a fit alone; of many places no whole is asked for."""
+        """``lost`` are effects without a fit alone; of many places (``several``) no whole is asked for."""
         singles = [candidate(name, self.leaves(frozenset(name))) for name in NAMES if name not in lost]
-        base: Any = SimpleNamespace(several=not from_above, prepared=None)
-        return searched(base, singles, [], [effect(name) for name in NAMES], lambda _: done, fewer_than, progress)
+        base: Any = SimpleNamespace(several=not from_above if several is None else several, prepared=None)
+        asked = [effect(name) for name in NAMES]
+        return searched(base, singles, [], asked, lambda _: done, fewer_than, progress, from_above=from_above)
 
     def sizes(self) -> set[int]:
         """Of the sets of several effects."""
@@ -326,10 +327,10 @@ def test_what_grows_astray_is_found_from_above(monkeypatch: pytest.MonkeyPatch):
     def astray(parent: frozenset[str], size: int) -> Sequence[Iterable[str]]:
         return ["abcd"[:size]] if parent == set(NAMES) else [s for s in combinations(NAMES, size) if "d" not in s]
 
-    def found(*, from_above: bool) -> tuple[str, list[str | None]]:
+    def found(*, from_above: bool, several: bool = False) -> tuple[str, list[str | None]]:
         bench = Bench(monkeypatch, hidden("abcd"))
         bench.proposed = astray
-        search = bench.search(from_above=from_above)
+        search = bench.search(from_above=from_above, several=several)
         return best(search, 4), [beside for names, beside in bench.fitted if names == "abcd"]
 
     every = candidate(NAMES, {})
@@ -337,6 +338,7 @@ def test_what_grows_astray_is_found_from_above(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(set_search, "_with_shapes", lambda *_: [])
     assert found(from_above=False)[0] != "abcd"
     assert found(from_above=True) == ("abcd", [every.name])
+    assert found(from_above=True, several=True)[0] != "abcd"  # what is missing from the whole of many places
 
 
 def test_what_was_not_fitted_alone_is_asked_for_beside_the_best_sets_and_each_shape_anew(
