@@ -52,7 +52,7 @@ PART_TWO_RESULTS = [
     STRUCTURE_RESULTS,
     PART_TWO_TABLES,
     PART_TWO_CLAIMS,
-    list(PART_TWO_FIGURES.values()),
+    [list(figures.values()) for figures in PART_TWO_FIGURES.values()],
 ]
 
 

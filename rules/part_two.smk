@@ -22,7 +22,7 @@ LADDER_ROWS = {name: _measurements[name] for name in LADDERS}
 
 PART_TWO_TABLES = [f"results/part_two/{name}.csv" for contents in CHAPTERS.values() for name in contents.tables]
 PART_TWO_CLAIMS = "results/part_two/claims.csv"
-PART_TWO_FIGURES = {name: pictures(name) for contents in CHAPTERS.values() for name in contents.figures}
+PART_TWO_FIGURES = {chapter: {name: pictures(name) for name in contents.figures} for chapter, contents in CHAPTERS.items()}
 CODE["chapters"] = modules("part_two", also=[f"study.reproduction.chapters.{c.module}" for c in CHAPTERS.values()])
 # Of results/study.html: a chapter's stand in its section.
 PART_TWO_PICTURES = [
@@ -85,18 +85,25 @@ rule part_two_claims:
         step("part_two", input, output, params, wildcards)
 
 
-rule draw_part_two:
-    input:
-        tables=PART_TWO_TABLES,
-        style=STYLE,
-        code=CODE["chapters"],
-    output:
-        **PART_TWO_FIGURES,
-    benchmark:
-        "results/benchmarks/draw_part_two.tsv"
-    run:
-        step("part_two", input, output, params, wildcards)
+for _chapter, _contents in CHAPTERS.items():
+
+    rule:
+        name:
+            f"draw_chapter.{_chapter}"
+        input:
+            tables=[f"results/part_two/{name}.csv" for name in _contents.tables],
+            style=STYLE,
+            code=CODE["chapters"],
+        output:
+            **PART_TWO_FIGURES[_chapter],
+        params:
+            chapter=_chapter,
+        benchmark:
+            f"results/benchmarks/draw_chapter.{_chapter}.tsv"
+        run:
+            step("part_two", input, output, params, wildcards)
 
 
 PART_TWO_BENCHMARKS = [f"results/benchmarks/chapter.{chapter}.tsv" for chapter in CHAPTERS]
-PART_TWO_BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("part_two_claims", "draw_part_two")]
+PART_TWO_BENCHMARKS += [f"results/benchmarks/draw_chapter.{chapter}.tsv" for chapter in CHAPTERS]
+PART_TWO_BENCHMARKS += ["results/benchmarks/part_two_claims.tsv"]

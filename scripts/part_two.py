@@ -1,4 +1,4 @@
-"""Snakemake step: tables of all chapters of Part II -> their claims with verdicts, or their figures."""
+"""Snakemake step: tables of Part II -> the claims of all chapters with verdicts, or the figures of one."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -20,11 +20,10 @@ def judge(folder: Path, statements: Path, output: Path) -> None:
     tables.write_table(pd.concat(judged, ignore_index=True), output)
 
 
-def draw(folder: Path, outputs: Mapping[str, Sequence[Path]], style: Path) -> None:
-    for chapter in CHAPTERS:
-        made = tables_of(folder, chapter)
-        kinds = {name: partial(figure, made) for name, figure in get_chapter(chapter).figures.items()}
-        page.write_each(kinds, {name: paths for name, paths in outputs.items() if name in kinds}, style)
+def draw(folder: Path, chapter: str, outputs: Mapping[str, Sequence[Path]], style: Path) -> None:
+    made = tables_of(folder, chapter)
+    kinds = {name: partial(figure, made) for name, figure in get_chapter(chapter).figures.items()}
+    page.write_each(kinds, outputs, style)
 
 
 if "snakemake" in globals():
@@ -35,4 +34,4 @@ if "snakemake" in globals():
             judge(folder, Path(step.input.statements), Path(step.output.claims))
         else:
             drawn = {name: [Path(path) for path in paths] for name, paths in step.output.items()}
-            draw(folder, drawn, Path(step.input.style))
+            draw(folder, step.params.chapter, drawn, Path(step.input.style))

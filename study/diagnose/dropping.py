@@ -127,10 +127,15 @@ def changing(model: Model) -> dict[str, str]:
     return {t.term.variation.of.name + t.place.suffix: t.name for t in model.terms if t.term.variation}
 
 
-def check_can_go(model: Model, name: str) -> None:
-    """Refuse what is not in the model, inertia, what changes in it, and a term without which nothing is left."""
+def check_no_change(model: Model, name: str) -> None:
+    """Refuse a term whose coefficient changes in the model."""
     change = changing(model).get(name)
     expect(change is None, f"{change} says how {name} changes; expected that to be dropped first")
+
+
+def check_can_go(model: Model, name: str) -> None:
+    """Refuse what is not in the model, inertia, what changes in it, and a term without which nothing is left."""
+    check_no_change(model, name)
     names = [t.name for t in model.terms if t.term.name != "inertia"]
     if not model.named:
         expect(name != "inertia", "inertia cannot be dropped; a free run needs a mass, expected another term")

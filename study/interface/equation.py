@@ -315,11 +315,12 @@ class Model:
 
         A ``StudyError`` if it lacks it or has no other.
         """
-        from study.diagnose.dropping import term_at
+        from study.diagnose.dropping import check_no_change, term_at
 
         place = _place(name, at, between)
         gone = term_at(self.equation, name, None if place == HERE else place) if self.equation.named else name
         expect(gone in self.terms, f"model {self.name!r} has no term {name!r}; expected {', '.join(self.terms)}")
+        check_no_change(self.equation, gone)
         return self._with_terms(*(t for t in self.equation.terms if t.name != gone))
 
     def _with_terms(self, *entries: ModelTerm) -> "Model":

@@ -134,7 +134,7 @@ def test_part_two_is_a_job_a_chapter_and_one_page_has_both(built):
     assert {name for name in jobs if name.startswith("chapter.")} == {
         f"chapter.{name}" for name in ("excitations", "forces", "noise", "structures", "varying")
     }
-    assert {"ladders", "part_two_claims", "draw_part_two", "part2"} <= set(jobs)
+    assert {"ladders", "part_two_claims", "draw_chapter.noise", "part2"} <= set(jobs)
     assert planned(built, "all").keys() == {*(jobs.keys() - {"part2"}), "study_page", "all"}
 
 

@@ -37,7 +37,7 @@ from study.reproduction.cases import make_record
 from study.reproduction.chapters.chapter import Chapter, DrivenSettings, Tables, judges
 from study.reproduction.claims.judgement import Condition, explained
 from study.reproduction.claims.reported import COMBINED, SYSTEMS, Reported
-from study.reproduction.ensemble import NOISE_OFFSET
+from study.reproduction.ensemble import NOISE_OFFSET, threaded
 from study.reproduction.settings import AllowedErrors, ClaimSettings, ExcitationSettings, RecordSettings
 from study.reproduction.tables import judge_estimate
 from study.support.document import Block, Text, table
@@ -69,13 +69,11 @@ def make_excitations(study: ClaimSettings, own: DrivenSettings, models: Path) ->
     ``independent`` the median over its lines of the smallest share of an input that the others do not determine, and
     ``driven`` the share of lines with a force.
     """
-    rows: list[dict[str, Any]] = []
-    for system in SYSTEMS:
-        model = read_model(models / f"{system}.yaml")
-        for driven in _forces(study, own):
-            for seed in range(own.first_seed, own.first_seed + own.seeds):
-                rows += _of_record(system, model, study, own, driven, seed)
-    return {"excitations": pd.DataFrame(rows)}
+    seeds = range(own.first_seed, own.first_seed + own.seeds)
+    asked = [(system, driven, seed) for system in SYSTEMS for driven in _forces(study, own) for seed in seeds]
+    every = {system: read_model(models / f"{system}.yaml") for system in SYSTEMS}
+    found = threaded(lambda one: _of_record(one[0], every[one[0]], study, own, *one[1:]), asked)
+    return {"excitations": pd.DataFrame([row for rows in found for row in rows])}
 
 
 def _forces(study: ClaimSettings, own: DrivenSettings) -> Iterator[Driven]:
