@@ -101,6 +101,14 @@ def test_the_diagnosis_names_the_effect_and_its_frame_holds_every_candidate(foun
     assert "missing" in found.says
 
 
+def test_what_changes_is_not_dropped_before_its_change():
+    change = st.term("linear_stiffness", varies_with="time", shape="line")
+    changing = LINEAR.add(change)
+    with pytest.raises(st.StudyError, match="linear_stiffness_over_time says how linear_stiffness changes"):
+        changing.drop("linear_stiffness")
+    assert changing.drop("linear_stiffness_over_time").terms == LINEAR.terms
+
+
 def test_what_is_missing_beside_values_that_are_held_is_found():
     braked = NONLINEAR.add(st.term("coulomb_friction", value=0.2))
     record = st.simulate(braked, st.gaussian(1.0, samples=2048, seed=5), noise=1e-4, name="braked")
