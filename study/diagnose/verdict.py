@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -174,12 +174,13 @@ def _changing(
     base = base if as_it_was else search_base(suspect.comparison)
     others = tried if tried and as_it_was else candidates.try_all(entries, base, progress)
     changes = varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
-    both = [*entries, *suspect.entries]
+    every, both = [*others, *changes], [*entries, *suspect.entries]
+    diagnosed = partial(_diagnosis, suspect.comparison, base, every, both, progress, beside=beside)
     if beside:  # a change that is there gains when it is added: all effects at once are asked for where one does
-        grown = _diagnosis(suspect.comparison, base, [*others, *changes], both, progress, beside=True, from_above=False)
-        if not grown.changes:
+        grown = diagnosed(from_above=False)
+        if not grown.changes or grown.ended_at is not None:
             return grown
-    return _diagnosis(suspect.comparison, base, [*others, *changes], both, progress, beside=beside)
+    return diagnosed()
 
 
 def _diagnosis(

@@ -1,10 +1,13 @@
 """Coefficients that vary, found: along time, with a channel, in a step; and not where something else is missing."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from study.diagnose import verdict
 from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
@@ -68,6 +71,32 @@ def test_in_one_decay_nothing_changes_with_time_as_its_amplitude_falls_with_it(m
     seen = promised_changes(fit, prepared, fit.model.terms)
     assert seen is not None
     assert any(entry.name == "linear_damping_over_time" for entry in seen.shares)
+
+
+@pytest.mark.parametrize(
+    ("beside", "changes", "ended_at", "asked"),
+    [(True, False, None, [False]), (True, True, None, [False, True]), (True, True, 2, [False]),
+     (False, True, None, [True])],
+)  # fmt: skip
+def test_beside_what_is_named_a_change_has_to_gain_before_all_effects_are_asked_for_at_once(
+    monkeypatch: pytest.MonkeyPatch, beside: bool, changes: bool, ended_at: int | None, asked: list[bool]
+):
+    """Nor are they where the user has ended the search; nothing is fitted here."""
+    made: list[bool] = []
+
+    def diagnosis(*_: Any, from_above: bool = True, **__: Any) -> Any:
+        made.append(from_above)
+        return SimpleNamespace(changes=changes, ended_at=ended_at)
+
+    comparison: Any = SimpleNamespace()
+    seen = SimpleNamespace(comparison=comparison, entries=[])
+    monkeypatch.setattr(verdict, "_diagnosis", diagnosis)
+    monkeypatch.setattr(verdict.varying_candidates, "suspect", lambda *_: seen)
+    monkeypatch.setattr(verdict.varying_candidates, "simplest", lambda _: [])
+    monkeypatch.setattr(verdict.candidates, "try_all", lambda *_: [])
+    nothing: Any = None
+    verdict._changing(nothing, comparison, nothing, [nothing], [], None, beside=beside)
+    assert made == asked
 
 
 def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():
