@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from study.commands.command import finite_number, whole_number
 from study.records import MOTIONS
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -277,6 +277,10 @@ def out_folder(arguments: argparse.Namespace) -> Path:
 
     first: Path = arguments.records[0]
     folder: Path = arguments.out if arguments.out is not None else RESULTS / (first.stem or "record")
+    expect(
+        folder.is_dir() or folder != arguments.out or folder.suffix not in (".yaml", ".csv", ".json", ".html", ".pdf"),
+        f"--out {folder}: this is the name of a file, and results go into a folder; expected such as {folder.stem}",
+    )
     check_folder(folder)
     return folder
 

@@ -171,6 +171,11 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_work(tmp_path: Path
         check_folder(Path("a\0b"))
 
 
+def test_results_do_not_go_into_a_folder_with_the_name_of_a_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "expected such as better" in refused(capsys, "rig.csv", "--model", "rig.yaml", "--out", "better.yaml")
+    assert not Path("better.yaml").exists()
+
+
 def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     write_files(tmp_path / "out", {"a.txt": b"old", "b.txt": b"old"})
     (tmp_path / "out" / "c.txt").mkdir()  # cannot be replaced by a file
