@@ -262,8 +262,7 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
     if record.stretches:
         return _along_stretches(record, span, driving, factor)
     first, last = span
-    part = slice(factor * first, factor * (last - 1) + 1)
-    columns = [_kept(record[name], factor, record.reading(name))[part] for name in driving]
+    columns = [_kept(record[name], factor, record.reading(name), span) for name in driving]
     drive = in_columns(columns, factor * (last - first))
     return drive, ((0, record.start + first * record.dt),), None
 
@@ -287,9 +286,9 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
     return _MOTIONS.get((record, span, driving, factor), size, made)
 
 
-def _kept(values: Floats, factor: int, reading: str) -> Floats:
+def _kept(values: Floats, factor: int, reading: str, span: tuple[int, int] | None = None) -> Floats:
     """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
-    return between_samples_kept(_FORCES, values, factor, reading)
+    return between_samples_kept(_FORCES, values, factor, reading, span)
 
 
 _FORCES, _MOTIONS = Recent(), Recent()

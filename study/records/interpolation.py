@@ -20,8 +20,12 @@ BETWEEN_SAMPLES = (BAND_LIMITED, "straight", "held")
 WORDS = {"straight": "goes in straight lines from sample to sample", "held": "is held from each sample to the next"}
 
 
-def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
+def between_samples(
+    values: Floats, factor: int, reading: str = BAND_LIMITED, span: tuple[int, int] | None = None
+) -> Floats:  # fmt: skip
     """Values on a grid ``factor`` times as fine, shape (factor (n - 1) + 1,); every ``factor``-th is the sample itself.
+
+    Of a ``span`` of samples only those are made that lie in it, n being its length.
 
     A record that closes on itself is taken as periodic, which is exact for a periodic excitation; otherwise its ends
     are continued by point reflection and faded, which confines the error to the first and last few samples. A jump
@@ -31,31 +35,39 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
     Where a held one jumps, the mean of both values stands: an integrator's steps on both sides then add up to the jump.
     """
     n = len(values)
+    first, last = span or (0, n)
+    wanted = slice(factor * first, factor * (last - 1) + 1)
     if factor == 1 or n == 1:
-        return values.copy()
+        return values[first:last].copy()
     if reading == "straight":
-        return np.interp(np.arange(factor * (n - 1) + 1) / factor, np.arange(n), values)
+        return np.interp(np.arange(factor * (n - 1) + 1) / factor, np.arange(n), values)[wanted]
     if reading == "held":
         fine = np.append(np.repeat(values[:-1], factor), values[-1])
         fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
-        return fine
-    if closes(values):
-        return _periodic(values, factor)[: factor * (n - 1) + 1]
-    longer = _reflected(values)
-    edge = (len(longer) - n) // 2
-    return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
+        return fine[wanted]
+    whole = values if closes(values) else _reflected(values)
+    edge = (len(whole) - n) // 2
+    return _periodic(whole, factor, edge + first, edge + last)[: factor * (last - first - 1) + 1]
 
 
-def between_samples_kept(kept: Recent, values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
-    """As :func:`between_samples`, not to be written to: what was made last is ``kept``, by the values themselves."""
+def between_samples_kept(
+    kept: Recent, values: Floats, factor: int, reading: str = BAND_LIMITED, span: tuple[int, int] | None = None
+) -> Floats:  # fmt: skip
+    """As :func:`between_samples`, not to be written to: what was made last is ``kept``, by the values themselves.
+
+    It serves every span of them, unless it takes more than there is room for: then no more is made than is asked for.
+    """
     own = values.tobytes()
+    first, last = span or (0, len(values))
+    part = (first, last) if len(own) * (1 + factor) > kept.room else (0, len(values))
 
     def made() -> Floats:
-        fine = between_samples(np.frombuffer(own), factor, reading)
+        fine = between_samples(np.frombuffer(own), factor, reading, part)
         fine.flags.writeable = False
         return fine
 
-    return kept.get((own, factor, reading), len(own) * (1 + factor), made)
+    fine = kept.get((own, factor, reading, part), len(own) + 8 * factor * (part[1] - part[0]), made)
+    return fine[factor * (first - part[0]) : factor * (last - 1 - part[0]) + 1]
 
 
 def in_columns(values: Sequence[Floats], n: int) -> Floats:
@@ -129,17 +141,17 @@ def _top_energy(values: Floats) -> float:
     return float(np.sum(np.abs(lines[int(0.9 * len(lines)) :]) ** 2)) / len(values)
 
 
-def _periodic(values: Floats, factor: int) -> Floats:
-    """The samples, and between them the record shifted by one part of an interval after the other.
+def _periodic(values: Floats, factor: int, first: int, last: int) -> Floats:
+    """Samples ``first`` to ``last``, and between them the record shifted by one part of an interval after the other.
 
     Transforms of the record's length take a tenth of the time of one that is ``factor`` times as long, at 1e6 samples.
     """
     n = len(values)
     spectrum = np.asarray(rfft(values), dtype=np.complex128)
     shift = np.exp(2j * np.pi / (factor * n) * np.arange(len(spectrum)))
-    fine = np.empty((n, factor))
-    fine[:, 0] = values
+    fine = np.empty((last - first, factor))
+    fine[:, 0] = values[first:last]
     for part in range(1, factor):
         spectrum *= shift
-        fine[:, part] = irfft(spectrum, n)
+        fine[:, part] = irfft(spectrum, n)[first:last]
     return fine.reshape(-1)

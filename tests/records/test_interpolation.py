@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from study.records.excitation import Excitation, force
-from study.records.interpolation import between_samples
+from study.records.interpolation import BETWEEN_SAMPLES, between_samples, between_samples_kept
+from study.support.recent import Recent
 
 
 @pytest.mark.parametrize("samples", [256, 257])
@@ -42,6 +43,20 @@ def test_samples_themselves_are_kept(factor: int, kind: str) -> None:
     fine = between_samples(x, factor)
     assert len(fine) == factor * (len(x) - 1) + 1
     np.testing.assert_allclose(fine[::factor], x, atol=1e-12)
+
+
+@pytest.mark.parametrize("room", [0, 1 << 20])
+@pytest.mark.parametrize("reading", BETWEEN_SAMPLES)
+def test_a_span_is_what_the_whole_record_has_there(reading: str, room: int) -> None:
+    """Kept or not: where there is no room for the whole, only the span is made."""
+    kept = Recent(room)
+    for x in (force(Excitation(), 500, 0.02, seed=1), np.linspace(0.0, 3.0, 500) ** 2):
+        whole = between_samples(x, 6, reading)
+        for first, last in ((0, 500), (0, 250), (250, 500), (100, 102)):
+            there = whole[6 * first : 6 * (last - 1) + 1]
+            np.testing.assert_array_equal(between_samples(x, 6, reading, (first, last)), there)
+            np.testing.assert_array_equal(between_samples_kept(kept, x, 6, reading, (first, last)), there)
+    assert kept.size == (8 * (500 + 6 * 2) if room == 0 else 2 * 8 * 500 * 7)
 
 
 @pytest.mark.parametrize("cycles", [10.3, 40.7, 77.7])
