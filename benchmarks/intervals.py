@@ -21,8 +21,8 @@ from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments
 from study.reproduction.config import load_config
-from study.reproduction.ensemble import threaded
 from study.support import document
+from study.support.cores import side_by_side
 
 ROOT = Path(__file__).parent.parent
 MODEL = read_model(ROOT / "models" / "duffing_van_der_pol.yaml")
@@ -93,7 +93,7 @@ def main() -> None:
     options.add_argument("--seeds", type=int, default=200)
     told = options.parse_args()
     seeds = range(FIRST, FIRST + told.seeds)
-    rows = [row for noise in NOISES for found in threaded(partial(one, noise), seeds) for row in found]
+    rows = [row for noise in NOISES for found in side_by_side(partial(one, noise), seeds) for row in found]
     table = pd.DataFrame(rows)
     missed = int(table["note"].sum())
     words = f"Over {told.seeds} seeds. {f'{missed} searches did not converge' if missed else 'Every search converged'}."

@@ -7,8 +7,7 @@ leakage that both share.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,12 +19,10 @@ from study.reproduction import tables
 from study.reproduction.cases import identify_case, make_record
 from study.reproduction.settings import IdentificationSettings, IntegratorSettings, RecordSettings
 from study.support.arrays import Floats
-from study.support.cores import cores
+from study.support.cores import side_by_side
 from study.support.errors import DivergenceError
 from study.support.numbers import LAST_DIGITS, SAME_RUN
 
-T = TypeVar("T")
-S = TypeVar("S")
 NOISE_OFFSET = 1_000_000  # noise seeds stand apart from force seeds
 BASIS = "miso"  # the report's estimator: gains are over its errors
 ERROR_COLUMNS = [
@@ -38,26 +35,6 @@ FINELY = IntegratorSettings(method="rk4", steps_per_sample=16)
 STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "rk4") for s in (1, 2, 4, 8)]
 NOTHING_FOUND = {"parameter": "", "true": math.nan, "fine": math.nan, "mean_error": math.nan,
                  "standard_error": math.nan, "relative_error": math.nan}  # fmt: skip
-
-
-def threaded(
-    work: Callable[[S], T],
-    items: Sequence[S],
-    progress: Callable[[int], None] | None = None,
-    workers: int | None = None,
-) -> list[T]:
-    """Results of ``work`` for each item, in order; the kernels and the FFT release the interpreter lock.
-
-    ``progress`` is called with the number of items done; ``workers`` is the number of threads, as many
-    as there are cores for this process where it is left out.
-    """
-    done: list[T] = []
-    with ThreadPoolExecutor(workers or cores()) as pool:
-        for result in pool.map(work, items):
-            done.append(result)
-            if progress is not None:
-                progress(len(done))
-    return done
 
 
 def estimates(
@@ -78,7 +55,12 @@ def estimates(
         found = identify_case(model, measured, identification)
         return tables.parameter_table(record.case, model, found, identification).assign(seed=seed)
 
-    return pd.concat([f for f in threaded(one, list(seeds), progress, workers) if len(f)], ignore_index=True)
+    found: list[pd.DataFrame] = []
+    for table in side_by_side(one, list(seeds), workers=workers):
+        found.append(table)
+        if progress is not None:
+            progress(len(found))
+    return pd.concat([table for table in found if len(table)], ignore_index=True)
 
 
 def tolerance_rates(table: pd.DataFrame) -> pd.DataFrame:
@@ -220,7 +202,7 @@ def _estimates(
             return {}, f"{seed} at {error.time:.4g} s"
         return {p.name: p.value for p in miso(model, simulated, estimation).parameters}, ""
 
-    runs = threaded(run, seeds)
+    runs = list(side_by_side(run, seeds))
     return [values for values, _ in runs], [lost for _, lost in runs if lost]
 
 

@@ -17,14 +17,17 @@ def cores() -> int:
 
 
 def side_by_side(
-    function: Callable[[Item], Result], items: Sequence[Item], effort: Callable[[Item], float] | None = None
-) -> Iterator[Result]:
-    """Results in the order of the items, as soon as they are there, by one thread a core.
+    function: Callable[[Item], Result], items: Sequence[Item], effort: Callable[[Item], float] | None = None,
+    workers: int | None = None,
+) -> Iterator[Result]:  # fmt: skip
+    """Results in the order of the items, as soon as they are there, by one thread a core, or so many ``workers``.
+
+    The compiled loops and the transforms release the interpreter's lock.
 
     What takes the most ``effort`` is begun first: last, it would keep the other cores waiting.
     """
     hardest_first = sorted(range(len(items)), key=lambda i: -effort(items[i]) if effort else 0.0)
-    with ThreadPoolExecutor(cores()) as pool:
+    with ThreadPoolExecutor(workers or cores()) as pool:
         begun = {i: pool.submit(function, items[i]) for i in hardest_first}
         try:
             for i in range(len(items)):

@@ -1,7 +1,6 @@
 """Many seeds at once: order, rates, and runs that diverge."""
 
 import math
-import time
 from pathlib import Path
 
 import numpy as np
@@ -25,21 +24,6 @@ def rows(*within, parameter="k", estimate=355.0):
         {"case": "a", "estimator": "miso", "parameter": parameter, "true": 355.3, "estimate": estimate,
          "standard_error": 0.5, "tolerance": 0.01, "within_tolerance": within, "seed": range(len(within))}
     )  # fmt: skip
-
-
-def test_results_come_in_the_order_of_the_items():
-    def slow_first(item):
-        time.sleep(0.02 / (1 + item))
-        return item**2
-
-    seen = []
-    assert ensemble.threaded(slow_first, range(8), seen.append, workers=4) == [i**2 for i in range(8)]
-    assert seen == list(range(1, 9))
-
-
-def test_an_error_in_one_item_is_not_lost():
-    with pytest.raises(ZeroDivisionError):
-        ensemble.threaded(lambda item: 1 / item, [1, 0, 2])
 
 
 def test_one_worker_or_two_give_the_same_table(systems):

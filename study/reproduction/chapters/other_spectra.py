@@ -37,9 +37,10 @@ from study.reproduction.cases import make_record
 from study.reproduction.chapters.chapter import Chapter, DrivenSettings, Tables, judges
 from study.reproduction.claims.judgement import Condition, explained
 from study.reproduction.claims.reported import COMBINED, SYSTEMS, Reported
-from study.reproduction.ensemble import NOISE_OFFSET, threaded
+from study.reproduction.ensemble import NOISE_OFFSET
 from study.reproduction.settings import AllowedErrors, ClaimSettings, ExcitationSettings, RecordSettings
 from study.reproduction.tables import judge_estimate
+from study.support.cores import side_by_side
 from study.support.document import Block, Text, table
 from study.support.errors import DivergenceError, StudyError
 from study.support.numbers import percent
@@ -72,7 +73,7 @@ def make_excitations(study: ClaimSettings, own: DrivenSettings, models: Path) ->
     seeds = range(own.first_seed, own.first_seed + own.seeds)
     asked = [(system, driven, seed) for system in SYSTEMS for driven in _forces(study, own) for seed in seeds]
     every = {system: read_model(models / f"{system}.yaml") for system in SYSTEMS}
-    found = threaded(lambda one: _of_record(one[0], every[one[0]], study, own, *one[1:]), asked)
+    found = list(side_by_side(lambda one: _of_record(one[0], every[one[0]], study, own, *one[1:]), asked))
     return {"excitations": pd.DataFrame([row for rows in found for row in rows])}
 
 

@@ -18,9 +18,10 @@ from study.records.record import Record
 from study.records.spectra import autospectrum
 from study.reproduction.cases import make_record
 from study.reproduction.claims.sample import Sample, average
-from study.reproduction.ensemble import NOISE_OFFSET, threaded
+from study.reproduction.ensemble import NOISE_OFFSET
 from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.arrays import Complexes, Floats
+from study.support.cores import side_by_side
 from study.support.errors import StudyError
 
 ENSEMBLES_KEPT = 20  # at a time, 7 MB each: so many that few are simulated twice
@@ -148,14 +149,14 @@ class Evidence:
         """Records of a drive, the study's own first."""
         model, settings = self.model(drive), record_settings(self.settings, drive)
         streams = [(None, None), *((seed, NOISE_OFFSET + seed) for seed in self.seeds)]
-        return tuple(threaded(lambda s: make_record(model, settings, seed=s[0], noise_seed=s[1]), streams))
+        return tuple(side_by_side(lambda s: make_record(model, settings, seed=s[0], noise_seed=s[1]), streams))
 
     def ensemble(self, drive: Drive, assumed: Assumed = OWN_TERMS) -> Ensemble:
         return self._ensembles(drive, assumed)
 
     def _identified(self, drive: Drive, assumed: Assumed) -> Ensemble:
         model = self.model(drive)
-        own, *others = threaded(lambda r: self.analyse(model, r, assumed), self.records(drive))
+        own, *others = side_by_side(lambda r: self.analyse(model, r, assumed), self.records(drive))
         return Ensemble(drive.system, own, tuple(others))
 
     def at(self, system: str, level: float = 1.0, noise: float = 0.0) -> Ensemble:
@@ -163,7 +164,7 @@ class Evidence:
         return self.ensemble(Drive(system, level, noise))
 
     def each(self, drive: Drive, number: Callable[[Record], float]) -> Sample:
-        return Sample.own_first(threaded(number, self.records(drive)))
+        return Sample.own_first(list(side_by_side(number, self.records(drive))))
 
     def of_channel(self, system: str, number: Callable[[Floats], float], channel: str = "displacement") -> Sample:
         """A number of one channel of each record of a system at unit variance."""

@@ -14,8 +14,9 @@ from study.reproduction.claims.evidence import Analysis, Assumed, Drive, Ensembl
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together, within_share
 from study.reproduction.claims.reported import COEFFICIENTS, COMBINED, Reported
 from study.reproduction.claims.sample import Sample, average
-from study.reproduction.ensemble import NOISE_OFFSET, threaded
+from study.reproduction.ensemble import NOISE_OFFSET
 from study.support.arrays import Complexes, Floats
+from study.support.cores import side_by_side
 from study.support.numbers import percent
 
 SPECTRA = {
@@ -96,7 +97,7 @@ def noise_output(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
         noisy = force + displacement_noise(force, noise, NOISE_OFFSET + evidence.seeds[index])
         return evidence.analyse(model, records[index].with_channels({"force": noisy})).miso
 
-    analyses = threaded(analysis, range(len(records)))
+    analyses = list(side_by_side(analysis, range(len(records))))
     for name in COEFFICIENTS:
         true, allowed = reported.table_1(COMBINED, name), evidence.tolerance(COMBINED, name)
         bias = Sample(tuple(a.values[name] / true - 1.0 for a in analyses))
@@ -232,7 +233,7 @@ def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dic
     """Relative error of each parameter against its exact value."""
     drive, settings = Drive(COMBINED, noise=noise), evidence.estimator_settings()
     model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*COEFFICIENTS, "f_n")}
-    identified = threaded(lambda r: instrumental(model, r, settings), evidence.records(drive))
+    identified = list(side_by_side(lambda r: instrumental(model, r, settings), evidence.records(drive)))
     estimates = [{p.name: p.value for p in i.parameters} for i in identified]
     return {n: Sample.own_first(e[n] / true - 1.0 for e in estimates) for n, true in truth.items()}
 
@@ -285,7 +286,7 @@ def _skewed(evidence: Evidence) -> Ensemble:
         return evidence.analyse(model, simulate(model, values, sampling.dt, integrator))
 
     assert excitation.seed is not None  # records of the same excitation are simulated before
-    own, *others = threaded(outcome, [excitation.seed, *evidence.seeds])
+    own, *others = side_by_side(outcome, [excitation.seed, *evidence.seeds])
     return Ensemble(COMBINED, own, tuple(others))
 
 

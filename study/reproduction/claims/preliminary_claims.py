@@ -21,7 +21,6 @@ from study.reproduction.claims.judgement import (
 )
 from study.reproduction.claims.reported import COMBINED, SYSTEMS, Reported
 from study.reproduction.claims.sample import Sample, average, kurtosis, share_of_power
-from study.reproduction.ensemble import threaded
 from study.reproduction.preliminary import (
     harmonic_beside,
     harmonic_pattern,
@@ -32,6 +31,7 @@ from study.reproduction.preliminary import (
     restoring_force,
 )
 from study.support.arrays import Floats
+from study.support.cores import side_by_side
 
 MAXIMUM = "maximum of the averaged autospectrum"
 OVALS = (("as in Table 1", 1, 1, 1), ("twice c", 2, 1, 1), ("twice U", 1, 2, 1), ("twice f_0", 1, 1, 2))  # c, U, f_0
@@ -135,7 +135,7 @@ def patterns_alike(evidence: Evidence, reported: Reported) -> Iterator[Condition
     """Random patterns fill the harmonic envelope of their largest displacement and stay within it."""
     for system in SYSTEMS[:-1]:  # the Extreme system has no natural frequency to swing at
         model, mass, drive = evidence.model(Drive(system)), reported.table_1(system, "m"), Drive(system)
-        pairs = threaded(lambda r, m=model, mass=mass: envelope(m, r, mass), evidence.records(drive))
+        pairs = list(side_by_side(lambda r, m=model, mass=mass: envelope(m, r, mass), evidence.records(drive)))
         inside, filled = (Sample.own_first(numbers) for numbers in zip(*pairs, strict=True))
         speed = evidence.each(drive, lambda r: float(np.std(r["velocity"]) / np.std(r["displacement"])))
         why = (
