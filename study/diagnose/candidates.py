@@ -96,9 +96,16 @@ class FittedCandidate:
     @cached_property
     def unphysical(self) -> str:
         """Why it is no physical effect as fitted, or does not act as itself; empty if neither is so."""
+        return self._broken(seldom=True) or idle_effects(self.fit, self.entries, self.prediction.prepared)
+
+    @property
+    def seldom(self) -> bool:
+        """Whether nothing speaks against its values but that such effects are few."""
+        return bool(self._broken(seldom=True)) and not self._broken(seldom=False)
+
+    def _broken(self, *, seldom: bool) -> str:
         values = self.fit.model.values
-        broken = next((why for e in self.entries if (why := e.term.physical(_own(e, values)))), "")
-        return broken or idle_effects(self.fit, self.entries, self.prediction.prepared)
+        return next((why for e in self.entries if (why := e.term.physical(_own(e, values), seldom=seldom))), "")
 
 
 def unknowns_of(entry: ModelTerm) -> int:

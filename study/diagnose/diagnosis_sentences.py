@@ -101,7 +101,7 @@ def _missing(diagnosis: Diagnosis, amounts: bool) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is still unexplained beside it, and is not noise.")
     if first.unphysical:
-        said.append(f"As fitted it is not physical: {first.unphysical}.")
+        said.append(f"As fitted it is {'unusual' if first.seldom else 'not physical'}: {first.unphysical}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
@@ -126,7 +126,7 @@ def _several(diagnosis: Diagnosis, answer: Ranked, amounts: bool) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
-        said.append(f"As fitted one of them is not physical: {answer.unphysical}.")
+        said.append(f"As fitted one of them is {'unusual' if answer.seldom else 'not physical'}: {answer.unphysical}.")
     if len(diagnosis.sets) > 1:
         count = len(diagnosis.sets)
         often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]

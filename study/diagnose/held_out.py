@@ -4,6 +4,7 @@ The judging part is predicted by the fit to the fitting part. The other way roun
 Gauss and Newton from that fit, by the sensitivities on the judging part, gives the coefficients that this part wants.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,20 +126,18 @@ def held_out_test(fit: FreeRunFit, before: Prediction, noise: Noise) -> HeldOutT
     prepared, outputs = before.prepared, before.prepared.outputs
     jacobian = linearise(fit, prepared)
     own = held_out(fit, before, jacobian, prepared)
-    columns: list[Floats] = []
+    judged, fitted = (np.zeros((len(part), 0)) for part in (own.judged, own.fitted))
     if before.run is not None and fit.keys and not fit.restarts:
-        try:
-            columns = [before.run.derivatives(fit), jacobian]
-        except DivergenceError:
-            columns = []
-    judged, fitted = [_orthonormal(outputs.whitened(x, noise)) for x in columns] or [
-        np.zeros((len(part), 0)) for part in (own.judged, own.fitted)
-    ]
+        with suppress(DivergenceError):  # of a long record the derivatives along one part take as much as its channels
+            judged = _orthonormal(outputs.whitened(before.run.derivatives(fit), noise))
+            fitted = _orthonormal(outputs.whitened(jacobian, noise))
     return HeldOutTest(outputs, noise, own, own.white(outputs, noise), (judged, fitted), prepared.free)
 
 
 def _orthonormal(columns: Floats) -> Floats:
-    return np.linalg.qr(columns / length_or_one(columns))[0]
+    """A basis of what the columns span; they are scaled in place."""
+    columns /= length_or_one(columns)
+    return np.linalg.qr(columns)[0]
 
 
 def independent(residual: Floats, derivatives: Floats, spread: Floats) -> Floats:

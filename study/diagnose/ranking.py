@@ -39,7 +39,6 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     outputs, fit = before.prepared.outputs, rows[0].fit
     noise = noise_left(fit.residual, len(fit.outputs))
-    white = {r.name: np.concatenate(r.held_out.white(outputs, noise)) for r in rows}
     alone = evidence(before, held_out_of(comparison))
     test = held_out_test(comparison.fit, before, noise)
     rows = [
@@ -48,6 +47,8 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
         )
         for r in rows
     ]
+    del test  # before as much is made for every row
+    white = {r.name: np.concatenate(r.held_out.white(outputs, noise)) for r in rows}
     return in_order(rows, white, asked)
 
 

@@ -301,13 +301,16 @@ def _decide(
             search=search,
         )  # fmt: skip
     sets = _ranked_sets(search, rows, comparison, asked)
+    unusual = first is not None and one.verdict == UNKNOWN and _unusual_alone(first, one.left, asked)
+    if unusual:  # no law forbids it: it is missing, unless a set does as much
+        one = replace(one, verdict=MISSING)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
         return replace(one, ended_at=search.ended_at)
     answer, left = _material(answer, sets, search, comparison)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
-    if verdict == UNKNOWN and first is not None and _stands_out(first, comparison.prepared):
+    if verdict == UNKNOWN and first is not None and (unusual or _stands_out(first, comparison.prepared)):
         first_alone = [first] + [r for r in rows if r is not first]
         return replace(one, verdict=MISSING, rows=first_alone, ended_at=search.ended_at)
     core = _necessary(good, search, comparison, asked) if verdict == UNKNOWN else None
@@ -462,6 +465,12 @@ def _stands_out(first: Ranked, prepared: Prepared) -> bool:
     """
     alone = prepared.response == FORCE or prepared.free
     return alone and first.gain.explained > NAMED_FIRST and not first.unphysical
+
+
+def _unusual_alone(first: Ranked, left: float, asked: int) -> bool:
+    """Whether an effect with values that are seldom met leaves nothing."""
+    steady = not (first.idle or first.wanders(asked))
+    return first.seldom and steady and first.gain.explained >= ENOUGH and left <= TOLERANCE
 
 
 def _leaves_nothing(candidate: FittedCandidate) -> bool:

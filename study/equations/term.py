@@ -74,6 +74,7 @@ class PhysicalBound:
     over: str | None = None  # another one whose size is the bound; zero is, if left out
     reached: bool = False  # whether the bound itself will do
     enforced: bool = False  # whether no fit goes beyond it
+    seldom: bool = False  # whether effects beyond it break no law, and are few
 
     def broken(self, values: Mapping[str, float]) -> str:
         """A sentence on values by name that break it; empty if they do not, or are not all known."""
@@ -144,11 +145,15 @@ class Term:
         enforced = {c.name for c in self.bounds if c.enforced}
         return tuple(key for key in self.keys if key.rpartition(".")[2] in enforced)
 
-    def physical(self, values: Mapping[str, float | None]) -> str:
-        """Why this is no physical effect with these values by key, in a sentence; empty if it is, or may be one."""
+    def physical(self, values: Mapping[str, float | None], *, seldom: bool = True) -> str:
+        """Why this is no physical effect with these values by key, in a sentence; empty if it is, or may be one.
+
+        What breaks no law and is ``seldom`` met counts, unless told otherwise.
+        """
         own = {key.rpartition(".")[2]: values.get(key) for key in self.keys}
         known = {name: value for name, value in own.items() if value is not None}
-        return next((sentence for condition in self.bounds if (sentence := condition.broken(known))), "")
+        bounds = (bound for bound in self.bounds if seldom or not bound.seldom)
+        return next((sentence for bound in bounds if (sentence := bound.broken(known))), "")
 
     def as_reported(self, coefficients: Sequence[float]) -> tuple[float, ...]:
         """What the report gives in place of these coefficients, in the order of ``reported``: (4.9) and (4.10)."""

@@ -182,7 +182,11 @@ _TERMS = (
         ),
         conditions=(
             _spring("kz", "Bouc-Wen element"),
-            PhysicalBound("beta", "a Bouc-Wen element is passive for |gamma| <= beta", over="gamma", reached=True),
+            PhysicalBound("beta", "a Bouc-Wen element takes energy out, so beta is zero or more", reached=True),
+            PhysicalBound(
+                "beta", "the loops of joints and wire ropes seldom have |gamma| above beta", over="gamma", reached=True,
+                seldom=True,
+            ),
         ),
         placeless=True,
     ),
