@@ -15,7 +15,7 @@ import pandas as pd
 from scipy.special import ndtri
 
 from study.diagnose.next_test import WORTH
-from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
+from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.support.thresholds import K
 from study.trials.draw import NOISES
@@ -249,6 +249,8 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             Reach("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
             Reach("... or what is said leaves as little as the true model", _kinds(REMOVED),
                   lambda r: max(removed_score(r), as_good_as_truth(r))),
+            Reach("... or something beside it is said to have no name", _kinds(REMOVED),
+                  lambda r: max(removed_score(r), as_good_as_truth(r), float(r["verdict"] == PARTLY_KNOWN))),
             Reach("the fault named, its value within its interval", _faulty, fault_score, "fault"),
             Reach("... of those that the record shows beside the true equation", lambda r: r["fault_shown"] == "yes",
                   fault_score),
