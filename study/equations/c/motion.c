@@ -393,14 +393,16 @@ EXPORT int64_t integrate(
     int64_t failed = NO_MEMORY, runs = bound_count - 1, of_sample = observed_count * columns;
     int64_t begin = bounds[runs - 1], end = bounds[runs] + 1 < samples ? bounds[runs] + 1 : samples;
     size_t of_row = (size_t)columns * sizeof(double);
-    double *last = malloc((size_t)((end - begin) * of_sample + 1) * sizeof(double));
+    int shared = end > bounds[runs]; /* its last sample is another thread's: the motion is made beside `out` */
+    double *last = malloc((size_t)(shared ? (end - begin) * of_sample : 1) * sizeof(double));
     Rounding before = rounding();
     set_rounding(before | TINY_IS_ZERO);
     if (last && prepare_motion(&m, code, count, split, inputs, first, r, slots, slot_width)) {
         failed = ALL_FINITE;
         for (int64_t i = 0; i < runs && failed == ALL_FINITE; i++) {
             int64_t from = bounds[i], length = i + 1 < runs ? bounds[i + 1] + 1 - from : end - from;
-            double *y = states + i * state_count * columns, *target = i + 1 < runs ? out + from * of_sample : last;
+            double *y = states + i * state_count * columns;
+            double *target = i + 1 < runs || !shared ? out + from * of_sample : last;
             for (int64_t s = 0; s < state_count; s++) memcpy(m.state + s * m.width, y + s * columns, of_row);
             failed = (method == ADAMS ? along_adams : along_runge_kutta)(
                 &m, starts[i], dt, steps, drive + 2 * steps * from * drives, observed, observed_count, length, target
@@ -408,7 +410,7 @@ EXPORT int64_t integrate(
             for (int64_t s = 0; s < state_count; s++) memcpy(y + s * columns, m.state + s * m.width, of_row);
             if (failed >= 0) failed += from;
         }
-        if (failed == ALL_FINITE)
+        if (failed == ALL_FINITE && shared)
             memcpy(out + begin * of_sample, last, (size_t)((bounds[runs] - begin) * of_sample) * sizeof(double));
     }
     set_rounding(before);

@@ -195,7 +195,8 @@ class JudgingRun:
         """
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, 1, fit.model)
-        derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
+        before = self.prepared.plan.judge[0] - self.first
+        derivatives = run.respond(values, self.initial, run.moving)[1][before:].copy()  # as in `motions`
         if not np.all(np.abs(derivatives) < BEYOND_MEASURE):
             raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
         return _known(derivatives, self.prepared, self.prepared.plan.judge)
