@@ -124,7 +124,9 @@ def curves(
         return None, None
     sensors = len(fit.outputs)
     own = jacobian[:, columns] @ (direction / size)
-    basis = np.linalg.qr(np.delete(jacobian / length_or_one(jacobian), columns, axis=1))[0]
+    others = np.delete(jacobian, columns, axis=1)
+    others /= length_or_one(others)
+    basis = np.linalg.qr(others)[0]
     alone = own - basis @ (basis.T @ own)
     if np.linalg.norm(alone) <= LEAST_ALONE * np.linalg.norm(own):
         return None, None

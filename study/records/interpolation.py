@@ -8,7 +8,7 @@ content above its Nyquist frequency.
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.fft import irfft, rfft
+from scipy.fft import irfft, next_fast_len, rfft
 
 from study.records.completion import CONTINUED
 from study.records.record import Record, Stretch
@@ -45,7 +45,7 @@ def between_samples(
         fine = np.append(np.repeat(values[:-1], factor), values[-1])
         fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
         return fine[wanted]
-    whole = values if closes(values) else _reflected(values)
+    whole = values if closes(values) else _reflected(values, min(CONTINUED, n - 1))
     edge = (len(whole) - n) // 2
     return _periodic(whole, factor, edge + first, edge + last)[: factor * (last - first - 1) + 1]
 
@@ -84,13 +84,19 @@ def largest_between(values: Floats, factor: int) -> float:
 
 def closes(values: Floats) -> bool:
     """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
+    n = len(values)
+    edge = min(CONTINUED, n - 1)
+    if edge == CONTINUED:  # to a length of small factors, of which a transform takes a fraction of the time and room
+        length = n + 2 * edge
+        while (length := next_fast_len(length, real=True)) % 2 != n % 2:
+            length += 1
+        edge = min((length - n) // 2, n - 1)
     # a record that does not close has ten times the energy there of one whose ends are continued
-    return _top_energy(values) <= 10.0 * _top_energy(_reflected(values))
+    return _top_energy(values) <= 10.0 * _top_energy(_reflected(values, edge))
 
 
-def _reflected(values: Floats) -> Floats:
+def _reflected(values: Floats, edge: int) -> Floats:
     """A record continued at both ends by point reflection that is faded out, shape (n + 2 edge,)."""
-    edge = min(CONTINUED, len(values) - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]
