@@ -337,7 +337,8 @@ class _Problem:
     def _weighted(self, stacked: Floats) -> Floats:
         """Stacked values, zero where samples are lost, weighted by the noise; or columns of them."""
         if self.kept is not None:
-            stacked = stacked * (self.kept if stacked.ndim == 1 else self.kept[:, None])
+            with np.errstate(invalid="ignore"):  # derivatives beyond all numbers where a sample is lost: refused later
+                stacked = stacked * (self.kept if stacked.ndim == 1 else self.kept[:, None])
         return self.outputs.whitened(stacked, self.noise)
 
     def residual(self, x: Floats) -> Floats:
