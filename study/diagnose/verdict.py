@@ -126,6 +126,7 @@ def diagnose(
         if other is not None and other.changes:
             return other  # else nothing that is named changes, and the record is judged as it was
         elsewhere = 0 if other is None else len(changes.shares)
+    del changes  # and the record laid out anew: of a long one it takes as much as all that follows
     if (freed := _freed(comparison, base, tried)) is not None:
         return diagnose(freed, extra=extra, without=without, progress=progress)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)

@@ -291,7 +291,7 @@ def _kept(values: Floats, factor: int, reading: str, span: tuple[int, int] | Non
     return between_samples_kept(_FORCES, values, factor, reading, span)
 
 
-_FORCES, _MOTIONS = Recent(), Recent()
+_FORCES, _MOTIONS = Recent(), Recent(largest=1 << 25)  # of a long record the second is put together in no time
 
 
 def predict_response(
