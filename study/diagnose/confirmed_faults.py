@@ -34,7 +34,7 @@ def diagnose_accounted(
     what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
     record that is corrected for them is diagnosed, and the better of both diagnoses stands. Where nothing is found in
     a corrected record, what was corrected may have been the motion that is missing: then the record is diagnosed
-    without what the model alone told of its faults. Arguments as for
+    without what the model alone told of its faults, and that stands where it leaves less. Arguments as for
     :func:`study.diagnose.verdict.diagnose`.
     """
     made: list[Diagnosed] = []
@@ -62,7 +62,10 @@ def diagnose_accounted(
     removable = any(f.corrected and not _plain(f) for f in accounted.faults)
     if removable and first.diagnosis.verdict == UNKNOWN:
         other = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
-        first = first if other.diagnosis.answer is None else other
+        instead, corrected = other.diagnosis.answer, first.diagnosis.comparison.prediction
+        # what leaves no less than the correction by itself is the fault by another name
+        if instead is not None and instead.response_error < corrected.error:
+            first = other
     answer, faults = first.diagnosis.answer, first.accounted.faults
     if answer is None:
         return first

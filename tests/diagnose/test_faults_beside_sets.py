@@ -1,7 +1,7 @@
 """Faults of the measurement and missing effects are asked for in the light of each other; no record is fitted here."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -76,6 +76,7 @@ class Compared:
     notes: tuple[str, ...]
     model: Model = INERTIA
     record: Samples = SAMPLES
+    prediction: Any = field(default_factory=lambda: SimpleNamespace(error=1.0))
 
 
 class Corrected:
@@ -113,7 +114,10 @@ class Found:
 def diagnosed(
     monkeypatch: pytest.MonkeyPatch, record: Any, *found: tuple[tuple[str, ...], float, float]
 ) -> tuple[Any, int]:
-    """What comes out, and how many diagnoses were made; ``found`` are the effects of each, what is left, the error."""
+    """What comes out, and how many diagnoses were made; ``found`` are the effects of each, what is left, the error.
+
+    Where there are none, the error is that of the model.
+    """
     made: list[tuple[str, ...]] = []
 
     def diagnosis(comparison: Any, **_: Any) -> Any:
@@ -122,6 +126,8 @@ def diagnosed(
         answer = SimpleNamespace(entries=names, fit=None, response_error=error) if names else None
         changes = any("_over_" in name for name in names)
         verdict = SEVERAL if names else UNKNOWN
+        if not names and error:
+            comparison = replace(comparison, prediction=SimpleNamespace(error=error))
         return Found(answer, left, verdict, changes, comparison)
 
     monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
@@ -182,6 +188,18 @@ def test_what_was_corrected_may_be_the_motion_that_is_missing(monkeypatch: pytes
     assert record.otherwise[0] == (SPIKES, KNOWN)
     assert found.diagnosis.answer.response_error == 0.05
     assert found.accounted.faults == (SPIKES, KNOWN)
+
+
+@pytest.mark.parametrize("leaves", [0.05, 0.04])
+def test_an_effect_that_leaves_no_less_than_the_correction_does_not_undo_it(
+    monkeypatch: pytest.MonkeyPatch, leaves: float
+):
+    """Of the Silverbox an offset that was corrected came back as a constant force, and the error rose in between."""
+    record = Corrected([OFFSET], beside=[])
+    found, made = diagnosed(monkeypatch, record, ((), 0.1, leaves), (SET, 0.0, 0.05))
+    assert made == 2
+    assert found.accounted is record
+    assert found.diagnosis.answer is None
 
 
 def test_where_nothing_is_found_either_way_the_corrected_record_stands(monkeypatch: pytest.MonkeyPatch):
