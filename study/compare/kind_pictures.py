@@ -18,19 +18,22 @@ from study.records.record import FORCE, MOTIONS, Sensor
 
 
 def decay_figure(comparison: Comparison, decays: Mapping[str, Decays]) -> Figure:
-    """Frequency and damping ratio against amplitude, measured and of the fitted model; a column for each sensor."""
+    """Frequency and damping ratio against amplitude, measured and of the fitted model; a column for each sensor.
+
+    A window that does not tell its frequency from zero, at the end of a motion, is not drawn.
+    """
     count = len(decays)
     figure, axes = page.empty_page(
         f"{comparison.record.name}: free decay", f"model {comparison.model.name}; windows of the analytic signal",
         rows=2, columns=count, width=page.WIDE if count == 1 else page.width(count), panel=2.2, share=count == 1,
     )  # fmt: skip
     for column, (sensor, found) in enumerate(decays.items()):
-        both = axes[column], axes[count + column]
+        both, seen = (axes[column], axes[count + column]), found.measured
+        told = 2.0 * seen.frequency_error < seen.frequency
         for axis, what, name in zip(both, ("frequency", "damping"), ("frequency (Hz)", "damping ratio"), strict=True):
-            seen = found.measured
             axis.errorbar(
-                seen.amplitude, getattr(seen, what), 2.0 * getattr(seen, f"{what}_error"), fmt="o", markersize=3.0,
-                color="0.45", elinewidth=0.8, label="measured",
+                seen.amplitude[told], getattr(seen, what)[told], 2.0 * getattr(seen, f"{what}_error")[told], fmt="o",
+                markersize=3.0, color="0.45", elinewidth=0.8, label="measured",
             )  # fmt: skip
             if found.predicted is not None:
                 order = np.argsort(found.predicted.amplitude)
