@@ -21,6 +21,7 @@ for _case in STUDY.cases:
             settings=STUDY.identification_settings(_case).plain(),
             title=STUDY.cases[_case].title,
             drawn=STUDY.drawn(_case),
+        priority: int(_case == "dead_band")  # takes the longest: last, it would keep the other cores waiting
         benchmark:
             f"results/benchmarks/identify.{_case}.tsv"
         run:

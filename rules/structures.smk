@@ -51,6 +51,7 @@ for _name, _case in STRUCTURES.cases.items():
             record=STRUCTURES.record_settings(_name).plain(),
             settings=STRUCTURES.identification_settings(_name).plain(),
             limits=STRUCTURES.settings.limits,
+        priority: 1
         benchmark:
             f"results/benchmarks/structure.{_name}.tsv"
         run:

@@ -7,6 +7,7 @@ import ast
 import multiprocessing
 import runpy
 from collections.abc import Iterable, Mapping
+from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path
 from threading import Lock
@@ -19,12 +20,13 @@ FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
 
 
 def preload(scripts: Iterable[str]) -> None:
-    """Let the process that is forked have what Snakemake and these scripts import, before the first step runs."""
+    """Start the process that is forked: it loads what Snakemake and these scripts import while this one goes on."""
     names = {"snakemake.cli", "snakemake.iocontainers", __name__}
     for script in scripts:
         imports = (node for node in ast.parse(Path(script).read_text()).body if isinstance(node, ast.ImportFrom))
         names |= {name for i in imports for name in (i.module, *(f"{i.module}.{a.name}" for a in i.names)) if name}
     FORKS.set_forkserver_preload(sorted(names))  # names of no module are passed over
+    forkserver.ensure_running()
 
 
 def run_forked(script: str, step: Mapping[str, Any]) -> None:
