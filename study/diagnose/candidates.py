@@ -177,8 +177,8 @@ def those_not_tried(
     entries: Sequence[ModelTerm], tried: Sequence[FittedCandidate], base: Baseline, progress: Progress | None = None
 ) -> list[FittedCandidate]:
     """Fit and judge every candidate that promised too little; of two sides of a place the better stays."""
-    done = {(c.term.name, c.entry.place.path) for c in tried}
-    left = [entry for entry in entries if (entry.term.name, entry.place.path) not in done]
+    done = {c.entry.effect for c in tried}
+    left = [entry for entry in entries if entry.effect not in done]
     return _one_side(_fitted(screened(left, base), base, progress, len(tried)))
 
 
@@ -189,7 +189,7 @@ def _worse(candidate: FittedCandidate) -> tuple[bool, float]:
 def _one_side(candidates: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     best: dict[tuple[str, frozenset[str]], FittedCandidate] = {}
     for candidate in sorted(candidates, key=_worse):
-        best.setdefault((candidate.term.name, candidate.entry.place.path), candidate)
+        best.setdefault(candidate.entry.effect, candidate)
     return list(best.values())
 
 

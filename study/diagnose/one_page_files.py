@@ -30,7 +30,7 @@ p { margin: 0 0 1mm } table { border-collapse: collapse; width: 100% }
 td, th { text-align: left; padding: 0.2mm 3mm 0.2mm 0 }
 th { font-weight: 600; color: #444 } img { width: 100%; display: block; margin-top: 1mm }
 .notes, footer { font-size: 8pt; color: #444 }
-code { font: inherit; font-style: italic }"""
+code { font: inherit; font-style: italic } .option { white-space: nowrap }"""
 
 
 def one_page_files(content: OnePage) -> dict[str, bytes]:
@@ -103,15 +103,15 @@ def _spectrum(values: Floats, content: OnePage) -> tuple[Floats, Floats]:
 def as_html(content: OnePage, picture: bytes) -> bytes:
     """The page for a browser; printed, it is one sheet."""
     image = f'<img alt="what the model misses" src="data:image/svg+xml;base64,{base64.b64encode(picture).decode()}">'
-    completed = f"<p>with it: <code>{_powers(content.completed)}</code></p>" if content.completed else ""
+    completed = f"<p>with it: <code>{_marked_up(content.completed)}</code></p>" if content.completed else ""
     heads = ("", "as given", "with what is missing")
     body = [
         f"<h1>{html.escape(content.headline)}</h1><p>{html.escape(content.record)}</p>",
-        f"<h2>Equation</h2><p><code>{_powers(content.equation)}</code></p>{completed}",
+        f"<h2>Equation</h2><p><code>{_marked_up(content.equation)}</code></p>{completed}",
         f"<h2>Errors before and after</h2>{_table(heads, content.errors)}",
-        f"<h2>What is missing, and how sure that is</h2><p>{_powers(' '.join(content.says))}</p>{image}",
+        f"<h2>What is missing, and how sure that is</h2><p>{_marked_up(' '.join(content.says))}</p>{image}",
         f"<h2>Coefficients</h2>{_table(('', 'term', 'value', '95 % interval', 'unit'), _first(content.coefficients))}",
-        f'<p class="notes">{html.escape(_joined(content.notes))}</p><footer>{content.version}</footer>',
+        f'<p class="notes">{_marked_up(_joined(content.notes))}</p><footer>{content.version}</footer>',
     ]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(content.headline)}</title>\n'
@@ -121,12 +121,14 @@ def as_html(content: OnePage, picture: bytes) -> bytes:
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f"<th>{html.escape(cell)}</th>" for cell in heads)
-    lines = ("".join(f"<td>{_powers(cell)}</td>" for cell in row) for row in rows)
+    lines = ("".join(f"<td>{_marked_up(cell)}</td>" for cell in row) for row in rows)
     return f"<table><tr>{head}</tr>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
 
 
-def _powers(text: str) -> str:
-    return re.sub(r"\^(-?[0-9]+)", r"<sup>\1</sup>", html.escape(text))
+def _marked_up(text: str) -> str:
+    """A sentence or an equation: powers are raised, an option of the command line keeps to one line."""
+    options = re.sub(r"--[a-z]+", r'<span class="option">\g<0></span>', html.escape(text))
+    return re.sub(r"\^(-?[0-9]+)", r"<sup>\1</sup>", options)
 
 
 def _first(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:

@@ -156,12 +156,12 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
 
     Alone the motion may not show an effect at its place, nor bear it, and what has a shape of its own imitates others.
     """
-    sides = {(e.term.name, e.place.path): name for name, e in search.offered.items()}  # one side of a place is enough
+    sides = {e.effect: name for name, e in search.offered.items()}  # one side of a place is enough
     asked = [
         entry
         for name, entry in search.entries.items()
-        if (sides.get((entry.term.name, entry.place.path)) == name and entry.term.parameters and not simple)
-        or ((entry.term.name, entry.place.path) not in sides and not (simple and unknowns_of(entry) > 1))
+        if (sides.get(entry.effect) == name and entry.term.parameters and not simple)
+        or (entry.effect not in sides and not (simple and unknowns_of(entry) > 1))
     ]
     beside = [entry for entry in asked if entry.name not in parent.names]
     if not beside:
@@ -169,7 +169,7 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
     found = candidates.screened(beside, shape_search.baseline(parent.fit, search.base.prepared))
     for item in candidates.worth_fitting(found) if search.base.several else found:
         entry = item.entry
-        if sides.setdefault((entry.term.name, entry.place.path), entry.name) == entry.name:
+        if sides.setdefault(entry.effect, entry.name) == entry.name:
             search.offered[entry.name] = replace(entry, parameters=item.points[0].parameters)
 
 

@@ -34,6 +34,11 @@ class ModelTerm:
         return self.term.name + self.place.suffix
 
     @property
+    def effect(self) -> tuple[str, frozenset[str]]:
+        """Which effect, and between which ends: the same for either side of a place."""
+        return self.term.name, self.place.path
+
+    @property
     def symbols(self) -> tuple[str, ...]:
         """Names of its coefficients: ``k3``, or ``k3[floor2-floor3]``."""
         return self.keys[: len(self.coefficients)]

@@ -18,7 +18,7 @@ def candidate_entries(
     What acts on an angle is asked for where the coordinates turn: ``turning`` are those of the record that do.
     Modes hold whatever is linear already, and a force from outside is no property of a place between sensors.
     """
-    known = {(t.term.name, t.place.path) for t in model.terms}
+    known = {entry.effect for entry in model.terms}
     found: list[ModelTerm] = []
     for term in effects_but(without, extra):
         outside = external(term)

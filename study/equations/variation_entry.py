@@ -114,7 +114,7 @@ def _listed(values: Sequence[float]) -> str:
 
 def refuse_loose_changes(model: Model) -> None:
     """Refuse a change of a coefficient that the model does not have."""
-    there = {(entry.term.name, entry.place.path) for entry in model.terms}
+    there = {entry.effect for entry in model.terms}
     for entry in model.terms:
         if (variation := entry.term.variation) is not None and (variation.of.name, entry.place.path) not in there:
             raise StudyError(

@@ -47,6 +47,12 @@ def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
     assert one_page_files._first(content.coefficients)[-1][0] == "and 2 more"
 
 
+def test_an_option_keeps_to_one_line(content):
+    noted = replace(content, notes=("if u^2 was meant: --unit displacement=mm",))
+    text = one_page_files.as_html(noted, b"").decode()
+    assert 'u<sup>2</sup> was meant: <span class="option">--unit</span> displacement=mm' in text.lower()
+
+
 def test_of_records_with_the_same_times_the_one_that_is_shown_is_drawn():
     time, wave = np.tile(np.arange(0.0, 3.0, 0.1), 3), np.arange(90.0) % 31.0
     shown = slice(34, 40)
