@@ -10,7 +10,7 @@ from study.diagnose.late_force import late_force
 from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
-from study.faults.fault import Fault
+from study.faults.fault import SPIKES, Fault
 from study.support import statistics
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
@@ -72,7 +72,8 @@ def diagnose_accounted(
     model = accounted.comparison.model
     beside = len(faults) > 0 or first.accounted is not accounted
     noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
-    if first.diagnosis.left <= TOLERANCE and not (noisy or (beside and len(answer.entries) > 1)):
+    spiky = any(f.fault == SPIKES for f in faults)  # near the Nyquist frequency what is missing stands out as they do
+    if first.diagnosis.left <= TOLERANCE and not (noisy or spiky or (beside and len(answer.entries) > 1)):
         return first
     for entry in answer.entries:
         model = model.with_term(entry)

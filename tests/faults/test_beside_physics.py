@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from study import trials
+from study.diagnose.confirmed_faults import diagnose_accounted
+from study.equations.terms import LIBRARY
 from study.faults.accounting import accounted
 from study.faults.imposed import impose, shifted
 from study.faults.seen_in_residual import _turning
@@ -99,6 +101,18 @@ def test_a_clipped_record_that_is_looked_at_in_part_first_keeps_what_was_read_wi
     (fault,) = accounted(made.believed, prepare_record(made.record)).faults
     assert fault.fault == "clipping"
     assert 0.02 < np.mean(fault.lost) < 0.2
+
+
+def test_what_is_missing_near_the_nyquist_frequency_is_no_spikes():
+    """Beside the model alone 7 % of the samples stand out as spikes do, and the effect was found in what those left."""
+    made = trials.make_trial(560106, ("displacement_damping",), 0.0, "acceleration", test=DRIVEN_MASS)
+    first = accounted(made.believed, prepare_record(made.record))
+    assert [f.fault for f in first.faults] == ["spikes"]
+    others = [name for name in LIBRARY if name not in ("displacement_damping", "cubic_damping", "quadratic_damping")]
+    found = diagnose_accounted(first, without=others)
+    assert found.accounted.faults == ()
+    assert [e.term.name for e in found.diagnosis.answer.entries] == ["displacement_damping"]
+    assert found.diagnosis.answer.response_error < 0.001
 
 
 @pytest.mark.long
