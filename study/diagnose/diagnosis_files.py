@@ -12,6 +12,7 @@ from study.diagnose.held_values import CONTRADICTED
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
 from study.diagnose.next_test import suggested
 from study.diagnose.next_test_report import advice_in_words, next_test_fields
+from study.diagnose.varying_candidates import LAID_ANEW
 from study.diagnose.verdict import NOTHING, Diagnosis
 from study.equations.linear_part import modes_table
 from study.faults import fault
@@ -39,7 +40,7 @@ def all_names(record: Record) -> str:
 
 def choices_in_words(notes: Sequence[str]) -> list[str]:
     """What was chosen for the user, who may choose else, and what spoils the answer: said beside the verdict."""
-    said = [note for note in notes if CONTRADICTED in note]
+    said = [note for note in notes if CONTRADICTED in note or LAID_ANEW in note]
     return said + [note for note in notes if "(--" in note or "too coarsely" in note]
 
 

@@ -26,7 +26,10 @@ from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
+from study.support.numbers import percent
 from study.support.thresholds import ALPHA, PROMISING, TOLERANCE, K
+
+LAID_ANEW = "every other block is judged, as a coefficient changes along the record"  # by which the note is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,10 @@ def suspect(changes: PromisedChanges, comparison: Comparison) -> Suspect | None:
     try:
         if prepared is not comparison.prepared:
             rough = fit_part(fit.model, prepared, fit.held, steps=rough_steps(fit.model, prepared, {}))
+            elsewhere = percent(comparison.prediction.error)
             comparison = compare(comparison.model, prepared, fit=finished(rough, prepared))
+            said = f"{LAID_ANEW}; where 'study compare' judges, the model leaves {elsewhere}"
+            comparison = replace(comparison, notes=(*comparison.notes, said))
         return Suspect(comparison, [shaped for entry in chosen for shaped in _shapes(entry, prepared)])
     except StudyError:
         return None

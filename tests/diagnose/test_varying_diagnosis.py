@@ -9,13 +9,14 @@ import pytest
 
 from study.diagnose import verdict
 from study.diagnose.confirmed_faults import diagnose_accounted
+from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.diagnosis_pictures import picture_files
-from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.verdict import MISSING
 from study.equations.model_file import parse_model
 from study.identify.time_domain.promised_changes import promised_changes
 from study.records.record import Record
 from study.records.record_layout import Layout
+from study.support.numbers import percent
 from study.trials.draw import make_trial
 from study.trials.varying import make_varying_trial
 from study.way_in.compare_records import compare_records
@@ -35,7 +36,11 @@ def test_a_stiffness_that_drifts_by_a_third_says_so_and_nothing_else():
     (one,) = found.varying
     assert one.symbol == "k"
     assert one.along == "time"
-    assert "The model lacks linear stiffness that changes" in " ".join(diagnosis_sentences(found))
+    said = diagnosis_in_words(found)
+    assert "The model lacks linear stiffness that changes" in said
+    before = compare_records([trial.record], trial.believed).comparison.prediction.error
+    assert found.comparison.prediction.error < 0.9 * before
+    assert f"where 'study compare' judges, the model leaves {percent(before)}" in said
     assert "varying.png" in picture_files(found, trial.record.name)
 
 
