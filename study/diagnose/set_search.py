@@ -155,6 +155,7 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
     """Offer effects with the shapes at which they explain most beside a fitted set, and those that were not offered.
 
     Alone the motion may not show an effect at its place, nor bear it, and what has a shape of its own imitates others.
+    Beside modes each shape takes a fit of all of them: there the shapes stand that were found alone.
     """
     sides = {e.effect: name for name, e in search.offered.items()}  # one side of a place is enough
     asked = [
@@ -163,7 +164,8 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
         if (sides.get(entry.effect) == name and entry.term.parameters and not simple)
         or (entry.effect not in sides and not (simple and unknowns_of(entry) > 1))
     ]
-    beside = [entry for entry in asked if entry.name not in parent.names]
+    shaped = parent.fit.model.modal is None
+    beside = [e for e in asked if e.name not in parent.names and (shaped or not e.term.parameters)]
     if not beside:
         return
     found = candidates.screened(beside, shape_search.baseline(parent.fit, search.base.prepared))

@@ -43,6 +43,7 @@ def candidate(names: Iterable[str], amounts: Mapping[str, float], unphysical: st
     unknowns = sum(UNKNOWNS.get(name, 1) for name in chosen)
     model = SimpleNamespace(
         terms=[effect(name) for name in chosen],
+        modal=None,
         without_term=lambda name: SimpleNamespace(without=name),
     )
     record = SimpleNamespace(stretches=())
@@ -354,6 +355,15 @@ def test_what_was_not_fitted_alone_is_asked_for_beside_the_best_sets_and_each_sh
     simple = Bench(monkeypatch, hidden("abf"))
     simple.search(lost="bf", fewer_than=set_search.MOST_EFFECTS)
     assert {asked for _, asked in simple.screened} == {"b"}  # and b no more once it is offered
+
+
+def test_beside_modes_no_shape_is_asked_anew(monkeypatch: pytest.MonkeyPatch):
+    bench = Bench(monkeypatch, hidden("abf"))
+    nothing: Any = SimpleNamespace(several=True, prepared=None)
+    parent = candidate("a", {})
+    for parent.fit.model.modal in (None, "modes"):
+        set_search.offer_beside(SetSearch(nothing, {n: effect(n) for n in "bf"}, {}), parent, simple=False)
+    assert bench.screened == [("a", "bf"), ("a", "b")]
 
 
 def test_the_other_side_of_a_place_is_not_asked_for(monkeypatch: pytest.MonkeyPatch):
