@@ -47,7 +47,7 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
         f"{record}; the model as fitted misses {percent(diagnosis.comparison.prediction.error)} of the response",
         panel=3.4, legend_rows=0, headed=False, width=(1.4 if diagnosis.comparison.model.named else 1.0) * page.WIDTH,
     )  # fmt: skip
-    widest.subplots_adjust(left=0.34)
+    widest.subplots_adjust(left=0.34, right=0.86)
     ranking(axes, diagnosis)
     constancy, panels = page.empty_page(
         f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
@@ -59,25 +59,26 @@ def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
 
 
 def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
-    """Share of the held-out difference that each candidate explains, with its standard error."""
+    """Share of the held-out difference that each candidate explains, with its standard error; arrows point beyond."""
     rows = diagnosis.candidates[:10]
     place = np.arange(len(rows))
     shares = np.array([100.0 * r.gain.explained for r in rows])
     errors = np.array([100.0 * r.gain.error for r in rows])
-    axes.barh(
-        place, np.clip(shares, LEAST_DRAWN, 100.0), height=0.62, color=["0.25" if i == 0 else "0.7" for i in place]
-    )
-    axes.errorbar(
-        np.clip(shares, LEAST_DRAWN, 100.0), place, xerr=errors, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5
-    )
+    bars = np.clip(shares, LEAST_DRAWN, 100.0)
+    left, right = min(0.0, 1.1 * float(np.min(bars, initial=0.0))), 104.0
+    axes.barh(place, bars, height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
+    low, high = np.clip([shares - errors, shares + errors], left, right)
+    whiskers = np.maximum([bars - low, high - bars], 0.0)
+    axes.errorbar(bars, place, xerr=whiskers, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5, clip_on=False)
+    for beyond, edge, arrow in ((shares - errors < left, left, "<"), (shares + errors > right, right, ">")):
+        axes.plot(edge + 0.0 * place[beyond], place[beyond], arrow, color="0.05", markersize=4.5, clip_on=False)
     axes.set_yticks(place, [_label(r, rows[0]) for r in rows])
     axes.invert_yaxis()
-    axes.set_xlim(min(0.0, 1.1 * float(np.min(np.clip(shares, LEAST_DRAWN, 0.0), initial=0.0))), 136.0)
+    axes.set_xlim(left, right)
     axes.set_xticks([0, 20, 40, 60, 80, 100])
     for y, row in zip(place, rows, strict=True):
         axes.annotate(f"leaves {percent(row.response_error)}", (1.0, y), xycoords=("axes fraction", "data"),
-                      xytext=(-3, 0), textcoords="offset points", ha="right", va="center", fontsize=8,
-                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0})  # fmt: skip
+                      xytext=(8, 0), textcoords="offset points", ha="left", va="center", fontsize=8)  # fmt: skip
     axes.set_xlabel("share that it explains of what is missing (%)")
     return axes
 
