@@ -65,7 +65,7 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     shares = np.array([100.0 * r.gain.explained for r in rows])
     errors = np.array([100.0 * r.gain.error for r in rows])
     bars = np.clip(shares, LEAST_DRAWN, 100.0)
-    left, right = min(0.0, 1.1 * float(np.min(bars, initial=0.0))), 104.0
+    left, right = 1.1 * float(np.min(np.clip(shares - errors, LEAST_DRAWN, 0.0), initial=0.0)), 104.0
     axes.barh(place, bars, height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
     low, high = np.clip([shares - errors, shares + errors], left, right)
     whiskers = np.maximum([bars - low, high - bars], 0.0)

@@ -110,6 +110,11 @@ class EquationsAlongMotion:
                 total += (there - here) @ np.array([c or 0.0 for c in entry.coefficients])
         return self.base.fit.residual - total
 
+    @cached_property
+    def unexplained(self) -> Floats:
+        """The same less what the model's own coefficients could do, shape (n s,)."""
+        return self.beside_own(self.violated)
+
     def beside_own(self, columns: Floats) -> Floats:
         """Columns, shape (n s, ...), less what the model's own coefficients could do."""
         return columns - self.basis @ (self.basis.T @ columns)
@@ -126,7 +131,7 @@ class EquationsAlongMotion:
         added = self.beside_own(self.passed(entry.place, forces))
         if not np.all(np.isfinite(added)) or not np.any(added):
             return None
-        return explained_by(added, self.beside_own(self.violated), parameters)
+        return explained_by(added, self.unexplained, parameters)
 
     def moved(self, entry: ModelTerm, point: "Start", cutoff: float) -> dict[str, float]:
         """Coefficients of the model beside so much of a term."""
