@@ -8,7 +8,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from study.diagnose.constancy import CoefficientCurve
-from study.diagnose.diagnosis_pictures import constancy_panels, ranking
+from study.diagnose.diagnosis_pictures import constancy_panels, diagnosis_figures
 
 
 @pytest.mark.parametrize("coefficient", [-2.0, 2.0])
@@ -25,14 +25,21 @@ def test_a_constant_coefficient_is_drawn_at_one(coefficient):
     assert axes[0].get_xlabel() == "frequency (Hz)"
 
 
-def test_a_candidate_that_is_not_determined_reaches_no_label():
+@pytest.mark.parametrize("named", [False, True])
+def test_a_candidate_that_is_not_determined_reaches_no_label(named):
     told = [("cubic_stiffness", 0.84, 0.02), ("hysteresis", -4.0, 4.1), ("one_sided_contact", -20.0, 24.0)]
+    unseen = SimpleNamespace(coefficient=1.0, flatness=None, steadiness=None)
     rows = [
-        SimpleNamespace(name=name, tied_with=(), gain=SimpleNamespace(explained=share, error=error), response_error=0.7)
+        SimpleNamespace(
+            name=name, tied_with=(), gain=SimpleNamespace(explained=share, error=error), response_error=1.23e-15,
+            effect=unseen,
+        )
         for name, share, error in told
-    ]
-    axes = Figure().subplots()
-    ranking(axes, SimpleNamespace(candidates=rows))  # pyright: ignore[reportArgumentType]
+    ]  # fmt: skip
+    misses = SimpleNamespace(prediction=SimpleNamespace(error=0.1), model=SimpleNamespace(named=named))
+    diagnosis = SimpleNamespace(candidates=rows, comparison=misses, verdict="missing_effect")
+    figure = diagnosis_figures(diagnosis, "rig")["candidates"]  # pyright: ignore[reportArgumentType]
+    (axes,) = figure.axes
     (_, _, (whiskers,)) = next(c for c in axes.containers if isinstance(c, ErrorbarContainer))
     left, right = axes.get_xlim()
     ends = np.array([segment[:, 0] for segment in whiskers.get_segments()])
@@ -46,3 +53,4 @@ def test_a_candidate_that_is_not_determined_reaches_no_label():
     labels = [text.get_window_extent() for text in axes.texts]
     assert len(labels) == 3
     assert min(box.x0 for box in labels) > axes.get_window_extent().x1
+    assert max(box.x1 for box in labels) < figure.bbox.x1
