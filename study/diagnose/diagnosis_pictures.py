@@ -72,7 +72,7 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     whiskers = np.maximum([bars - low, high - bars], 0.0)
     axes.errorbar(bars, place, xerr=whiskers, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5, clip_on=False)
     for beyond, edge, arrow in ((shares - errors < left, left, "<"), (shares + errors > right, right, ">")):
-        axes.plot(edge + 0.0 * place[beyond], place[beyond], arrow, color="0.05", markersize=4.5, clip_on=False)
+        axes.plot([edge] * int(np.sum(beyond)), place[beyond], arrow, color="0.05", markersize=4.5, clip_on=False)
     axes.set_yticks(place, [_label(r, rows[0]) for r in rows])
     axes.invert_yaxis()
     axes.set_xlim(left, right)
