@@ -19,7 +19,7 @@ from study.support.thresholds import ALPHA, TOLERANCE
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
 SURE_POWER = 0.4  # standard error of a power, at most, for it to be called by a whole number
-HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
+HOPELESS = 0.98  # of the rms response, above the noise: an error with which a model predicts nothing
 POWER_NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
@@ -27,7 +27,7 @@ PARITY = {"odd": "odd in it", "even": "even in it"}
 def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
     """What a user should know of one record, in two or three sentences; ``diagnosed`` if its reader has that too."""
     sentences = [_how_good(comparison, diagnosed)]
-    if comparison.prediction.error >= HOPELESS:
+    if comparison.prediction.above_noise >= HOPELESS:
         sentences.append(_least(comparison))
     elif comparison.prediction.above_noise > TOLERANCE:
         sentences.append(_where(comparison))
@@ -60,7 +60,7 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     start = f"the model misses the response by {error} of its rms"
     if len(comparison.views) > 1:
         start += f", most at {comparison.worst.sensor} ({percent(comparison.worst.error)})"
-    if comparison.prediction.error >= HOPELESS:
+    if comparison.prediction.above_noise >= HOPELESS:
         # more than that is more than no motion at all would leave
         like = "as a model" if comparison.prediction.error < 1.1 else "more than a model"
         return (
@@ -71,6 +71,8 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     if all(noise.alone for noise in noises):
         source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
+        if comparison.prediction.floor**2 > 0.5:
+            doubt = ". Most of what is judged is noise, of which no model says anything (--judge A:B names another part)"
         return f"{start}, which looks like noise{source}: hardly any of it is above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= TOLERANCE:
         return (
@@ -121,6 +123,8 @@ def _of_equations(comparison: Comparison) -> list[str]:
 
 def _grows(growths: Growths | None) -> str:
     """The best power, as far as it stands out."""
+    if growths is not None and EXPLAINS <= growths.ways[0].share < TOLD_APART * growths.ways[0].share_error:
+        return "no power of displacement or velocity surely explains it"
     if growths is None or growths.ways[0].share < EXPLAINS:
         best = "" if growths is None else f" (the best explains {percent(max(growths.ways[0].share, 0.0))})"
         return f"no power of displacement or velocity explains it{best}"

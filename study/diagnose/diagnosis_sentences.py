@@ -41,10 +41,11 @@ def diagnosis_sentences(diagnosis: Diagnosis, amounts: bool = True) -> list[str]
 
 def _nothing(diagnosis: Diagnosis) -> str:
     where = " at any place" if diagnosis.comparison.model.named else ""
+    prediction = diagnosis.comparison.prediction
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
-        f"{percent(diagnosis.comparison.prediction.error)}, and what is left looks like noise: it depends neither on "
-        f"the motion{where}, nor on its past, nor on time. None of {_all_asked(diagnosis)} explains any of it."
+        f"{percent(prediction.error)}, where noise alone would leave {percent(prediction.floor)}, and what is left "
+        f"looks like noise: it depends neither on the motion{where}, nor on its past, nor on time. None of {_all_asked(diagnosis)} explains any of it."
     )
 
 

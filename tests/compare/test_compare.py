@@ -127,6 +127,16 @@ def test_what_is_no_function_of_the_motion_is_not_called_one(hidden: str) -> Non
     assert "no power of displacement or velocity explains it" in comparison_in_words(trial(hidden, 4, 0.01))
 
 
+def test_a_power_whose_share_is_within_its_own_error_is_not_named() -> None:
+    comparison = trial("cubic_stiffness", 41, 0.0)
+    assert comparison.growths is not None
+    assert "grows with the cube of displacement" in comparison_in_words(comparison)
+    best = comparison.growths.ways[0]
+    unsure = replace(best, share_error=0.6 * best.share)
+    doubted = replace(comparison, growths=replace(comparison.growths, ways=(unsure, *comparison.growths.ways[1:])))
+    assert "no power of displacement or velocity surely explains it" in comparison_in_words(doubted)
+
+
 def test_the_true_model_is_as_good_as_the_noise_after_the_effect_is_added() -> None:
     made = make_trial(5, hidden=["quadratic_damping"], noise=0.01)
     before = compared(made.believed, made.record)

@@ -254,6 +254,23 @@ def test_a_record_too_short_to_be_fitted_is_refused_for_that(capsys: pytest.Capt
     assert "has 65 samples, too few" in refused(capsys, "short.csv", "--model", "rig.yaml")
 
 
+def test_a_decay_that_is_over_before_the_judged_part_is_not_called_a_model_that_never_moves(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    t, omega, zeta = np.arange(1200) / 200.0, 2.0 * np.pi, 0.46
+    turns = omega * np.sqrt(1.0 - zeta**2)
+    u = 0.02 * np.exp(-zeta * omega * t) * (np.cos(turns * t) + zeta * omega / turns * np.sin(turns * t))
+    noisy = u + 2e-5 * np.random.default_rng(3).standard_normal(len(t))
+    write_csv(Record(1 / 200.0, {"displacement": noisy}, name="decay"), Path("decay.csv"))
+    assert cli.main(["compare", "decay.csv", "--free", "--model", "rig.yaml", "--out", "decay"]) == 0
+    said = capsys.readouterr().out
+    assert "which looks like noise" in said
+    assert "Most of what is judged is noise" in said
+    found = {c["key"]: c["value"] for c in json.loads(Path("decay/comparison.json").read_text())["coefficients"]}
+    assert found["c"] == pytest.approx(2.0 * zeta * omega, rel=2e-3)
+    assert found["k"] == pytest.approx(omega**2, rel=2e-3)
+
+
 @pytest.mark.long
 def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     write_csv(record().part(0, 500), Path("short.csv"))
