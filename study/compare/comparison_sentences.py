@@ -72,7 +72,7 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
         source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
         if comparison.prediction.floor**2 > 0.5:
-            doubt = ". Most of what is judged is noise, of which no model says anything (--judge A:B names another part)"
+            doubt = ". Most of what is judged is noise, which no model explains (--judge A:B names another part)"
         return f"{start}, which looks like noise{source}: hardly any of it is above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= TOLERANCE:
         return (

@@ -45,7 +45,8 @@ def _nothing(diagnosis: Diagnosis) -> str:
     return (
         f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
         f"{percent(prediction.error)}, where noise alone would leave {percent(prediction.floor)}, and what is left "
-        f"looks like noise: it depends neither on the motion{where}, nor on its past, nor on time. None of {_all_asked(diagnosis)} explains any of it."
+        f"looks like noise: it depends neither on the motion{where}, nor on its past, nor on time. None of "
+        f"{_all_asked(diagnosis)} explains any of it."
     )
 
 

@@ -253,19 +253,27 @@ class Model:
         """Coefficients and shape parameters by key, held or the start of a fit; None where nothing is given."""
         return self.equation.values | self.equation.starts
 
-    def hold(self, values: Mapping[str, float] | None = None, **more: float) -> "Model":
-        """The model with values given, by key (``k3``, or ``dead_band.u_g`` in a mapping), which a fit then holds.
+    def hold(self, *keys: str | Mapping[str, float], **values: float) -> "Model":
+        """The model with values that a fit then holds: ``hold("k")`` at its start, ``hold(k3=2e7)`` at another.
 
-        Without any, all that it has starts for.
+        A mapping says those whose keys have a dot: ``hold({"dead_band.u_g": 0.01})``. Without any, all that it has
+        starts for.
 
         Raises
         ------
         StudyError
-            If it has no such value.
+            If it has no such value, or no start for one that is named without a number.
         """
-        given = {**(values or {}), **more} or self.equation.starts
+        named = [key for key in keys if isinstance(key, str)]
+        self._check(tuple(named))
+        known = {key: value for key, value in self.values.items() if value is not None}
+        without = next((key for key in named if key not in known), None)
+        expect(without is None, f"model {self.name!r} has no start for {without!r}; expected a number, {without}=...")
+        given = {key: known[key] for key in named}
+        for mapping in (*(key for key in keys if not isinstance(key, str)), values):
+            given |= mapping
         self._check(tuple(given))
-        return Model.of(self.equation.with_values(given))
+        return Model.of(self.equation.with_values(given or self.equation.starts))
 
     def free(self, *keys: str) -> "Model":
         """The model with these values left open, starts included, or all of them.

@@ -295,6 +295,8 @@ def test_wrong_use_is_one_sentence(record, fit):
         (lambda: st.Model(), "a model needs terms"),
         (lambda: st.Model("inertia", "inertia"), "twice"),
         (lambda: NONLINEAR.hold(k9=1.0), "no value 'k9'"),
+        (lambda: NONLINEAR.hold("k9"), "no value 'k9'"),
+        (lambda: st.Model("inertia").hold("m"), "no start for 'm'; expected a number, m=..."),
         (lambda: NONLINEAR.drop("hysteresis"), "no term 'hysteresis'"),
         (lambda: fit.diagnose(without=["cubic"]), "there is no term 'cubic'"),
         (lambda: fit.diagnose({"bad": "__import__('os')"}), "'__import__"),
@@ -402,6 +404,9 @@ def test_a_saved_fit_is_the_start_of_another_and_holds_what_was_held(record, tmp
         assert again.coefficients[key].error == pytest.approx(fit.coefficients[key].error, rel=0.01)
     held = st.Model.load(tmp_path / "rig.yaml").hold()
     assert all(c.held for c in held.fit(record, measurement=False).coefficients.values())
+    one = st.Model.load(tmp_path / "rig.yaml").hold("k", c=4.0).equation
+    assert one.held_keys == ("m", "c", "k")
+    assert (one.values["k"], one.values["c"]) == (fit.coefficients["k"].value, 4.0)
     assert set(st.Model.load(tmp_path / "rig.yaml").free().values.values()) == {None}
 
 
