@@ -71,10 +71,10 @@ def draw(axes: Sequence[Axes], content: OnePage) -> None:
     for panel in axes:
         panel.legend(fontsize=7, loc="upper right", frameon=True, framealpha=0.8, edgecolor="none")
         panel.margins(x=0.0)
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(low, high + 0.45 * (high - low))  # room for the legend
-    top = axes[1].get_ylim()[1]
-    axes[1].set_ylim(top=30.0 * top)
+        scale = panel.yaxis.get_transform()
+        low, high = scale.transform(np.array(panel.get_ylim()))
+        room = np.array([low - 0.05 * (high - low), high + 0.5 * (high - low)])  # for the legend, and below
+        panel.set_ylim(*scale.inverted().transform(room))
 
 
 def same_motion(time: Floats, measured: Floats, shown_time: Floats, shown: Floats) -> Ints:

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 
 from study.diagnose import one_page_files
@@ -17,11 +19,15 @@ from study.trials import make_trial
 from study.way_in.compare_records import compare_records
 
 
-@pytest.fixture(scope="module")
-def content():
-    trial = make_trial(901, hidden=["quadratic_damping"], noise=0.01, response="displacement")
+def page_of(noise):
+    trial = make_trial(901, hidden=["quadratic_damping"], noise=noise, response="displacement")
     without = ("hysteresis", "relaxation", "periodic_stiffness", "harmonic_force", "cogging")
     return one_page(diagnose(compare_records([trial.record], trial.believed).comparison, without=without))
+
+
+@pytest.fixture(scope="module")
+def content():
+    return page_of(0.01)
 
 
 def test_the_page_says_what_is_missing_before_and_after(content):
@@ -45,6 +51,23 @@ def test_it_is_one_sheet_whatever_its_length(content, monkeypatch):
     assert "http" not in text.replace("http://www.w3.org", "")
     monkeypatch.setattr(one_page_files._Sheet, "most", 3)
     assert one_page_files._first(content.coefficients)[-1][0] == "and 2 more"
+
+
+def test_no_legend_covers_a_curve_and_no_curve_touches_the_frame():
+    content = page_of(0.0)  # what is left lies far below what was: the ordinate spans many decades
+    figure = Figure(figsize=(7.0, 2.5))
+    panels = figure.subplots(1, 2)
+    one_page_files.draw(list(panels), content)
+    figure.subplots_adjust(left=0.13, right=0.99, bottom=0.17, top=0.84)
+    FigureCanvasAgg(figure).draw()
+    for panel in panels:
+        covered, frame = panel.get_legend().get_window_extent(), panel.get_window_extent()
+        for line in panel.get_lines():
+            drawn = line.get_transform().transform(line.get_xydata())
+            inside = drawn[(drawn[:, 0] >= frame.x0) & (drawn[:, 0] <= frame.x1)]
+            assert not any(covered.contains(x, y) for x, y in inside)
+            assert np.min(inside[:, 1]) > frame.y0 + 2.0
+            assert np.max(inside[:, 1]) < frame.y1
 
 
 def test_an_option_keeps_to_one_line(content):
