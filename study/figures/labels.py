@@ -123,4 +123,6 @@ def term_names(text: str) -> str:
     words = text.replace("_", " ")
     for name in ("Van der Pol", "Coulomb", "Stribeck", "Duffing", "Mathieu"):
         words = words.replace(name.lower(), name)
+    for joined in ("one-sided", "load-dependent"):
+        words = words.replace(joined.replace("-", " "), joined)
     return words

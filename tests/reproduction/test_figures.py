@@ -113,6 +113,7 @@ def test_scaled_units():
     assert labels.power_of_ten(0.0) == (1.0, "")
     assert labels.quantity(0.00664, "m") == "6.64 mm"
     assert labels.term_names("van_der_pol_damping + coulomb friction") == "Van der Pol damping + Coulomb friction"
+    assert labels.term_names("one_sided_contact") == "one-sided contact"
 
 
 # ---- looks
