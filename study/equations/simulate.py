@@ -14,14 +14,16 @@ from study.equations import kernels
 from study.equations.linear_part import checked_mass_matrix
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import motion_program
-from study.records.interpolation import between_samples
+from study.records.interpolation import between_samples_kept, in_columns
 from study.records.record import MOTIONS, Record, Sensor, record_of
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
+from study.support.recent import Recent
 
 PLENTY = 8  # steps per sample with which a stable system is integrated stably
 TURN = 0.05  # rad in a step: an integrator of order four errs by about its fourth power, less than an effect
 METHODS = {"abm4": kernels.Method.ADAMS, "rk4": kernels.Method.ONE_BY_ONE}
+_FORCES = Recent(most=32)  # between their samples: several systems are often simulated under the same ones
 
 
 @dataclass(frozen=True)
@@ -102,8 +104,8 @@ def simulate(
     steps = integrator.steps_per_sample
     if len(initial) > motion.states:
         raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {motion.states} states")
-    columns = [between_samples(channels[name], 2 * steps)[:, None] for name in motion.drive]
-    drive = np.hstack(columns) if columns else np.zeros((2 * steps * count, 0))
+    columns = [between_samples_kept(_FORCES, channels[name], 2 * steps) for name in motion.drive]
+    drive = in_columns(columns, 2 * steps * count)
     state = np.zeros((1, motion.states, 1))
     state[0, : len(initial), 0] = initial
     out = np.empty((count, len(wanted), 1))

@@ -50,7 +50,7 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if prepared.response == FORCE or _stands(fit, prepared):
         return fit
-    if is_chaotic(fit, prepared):
+    if not is_poor(fit, prepared.fitted) or is_chaotic(fit, prepared):  # what is not poor and does not stand is chaotic
         apart = _in_segments(fit, prepared, fit)
         return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
