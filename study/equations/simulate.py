@@ -23,7 +23,7 @@ from study.support.recent import Recent
 PLENTY = 8  # steps per sample with which a stable system is integrated stably
 TURN = 0.05  # rad in a step: an integrator of order four errs by about its fourth power, less than an effect
 METHODS = {"abm4": kernels.Method.ADAMS, "rk4": kernels.Method.ONE_BY_ONE}
-_FORCES = Recent(most=32)  # between their samples: several systems are often simulated under the same ones
+_DRIVES = Recent(most=32)  # between their samples: several systems are often simulated under the same ones
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def simulate(
     steps = integrator.steps_per_sample
     if len(initial) > motion.states:
         raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {motion.states} states")
-    columns = [between_samples_kept(_FORCES, channels[name], 2 * steps) for name in motion.drive]
+    columns = [between_samples_kept(_DRIVES, channels[name], 2 * steps) for name in motion.drive]
     drive = in_columns(columns, 2 * steps * count)
     state = np.zeros((1, motion.states, 1))
     state[0, : len(initial), 0] = initial
