@@ -36,10 +36,11 @@ rule excitation_reading:
         models="models",
         settings=WITHOUT_NOISE,
     priority: 1
+    threads: HALF
     benchmark:
         "results/benchmarks/excitation_reading.tsv"
     run:
-        step("excitation_reading", input, output, params, wildcards)
+        step("excitation_reading", input, output, params, wildcards, threads)
 
 
 rule integrator_steps:
@@ -57,10 +58,11 @@ rule integrator_steps:
         models="models",
         settings=WITHOUT_NOISE,
     priority: 1
+    threads: HALF
     benchmark:
         "results/benchmarks/integrator_steps.tsv"
     run:
-        step("integrator_steps", input, output, params, wildcards)
+        step("integrator_steps", input, output, params, wildcards, threads)
 
 
 rule claims:
@@ -80,7 +82,8 @@ rule claims:
         models="models",
         settings=CLAIM_SETTINGS,
     priority: 1
+    threads: HALF
     benchmark:
         "results/benchmarks/claims.tsv"
     run:
-        step("claims", input, output, params, wildcards)
+        step("claims", input, output, params, wildcards, threads)

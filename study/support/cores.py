@@ -1,6 +1,7 @@
 """How much may run at once."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -9,11 +10,22 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+_granted = sys.maxsize
+
+
+def grant(number: int) -> None:
+    """Let this process use so many cores at most from here on.
+
+    Beside other steps more threads do no more: they wait for each other to leave the interpreter.
+    """
+    global _granted
+    _granted = number
+
+
 def cores() -> int:
     """Cores that this process may use, which a batch system or a container may hold below those of the machine."""
-    if hasattr(os, "sched_getaffinity"):  # Linux alone tells
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # Linux tells
+    return min(there, _granted)
 
 
 def side_by_side(
