@@ -25,7 +25,7 @@ for _case in STUDY.cases:
         benchmark:
             f"results/benchmarks/identify.{_case}.tsv"
         run:
-            step("identify", input, output, params, wildcards, threads)
+            step("identify", input, output, params, wildcards)
 
     rule:
         name:

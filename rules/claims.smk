@@ -36,11 +36,10 @@ rule excitation_reading:
         models="models",
         settings=WITHOUT_NOISE,
     priority: 1
-    threads: HALF
     benchmark:
         "results/benchmarks/excitation_reading.tsv"
     run:
-        step("excitation_reading", input, output, params, wildcards, threads)
+        step("excitation_reading", input, output, params, wildcards)
 
 
 rule integrator_steps:
@@ -58,11 +57,10 @@ rule integrator_steps:
         models="models",
         settings=WITHOUT_NOISE,
     priority: 1
-    threads: HALF
     benchmark:
         "results/benchmarks/integrator_steps.tsv"
     run:
-        step("integrator_steps", input, output, params, wildcards, threads)
+        step("integrator_steps", input, output, params, wildcards)
 
 
 rule claims:
@@ -82,8 +80,7 @@ rule claims:
         models="models",
         settings=CLAIM_SETTINGS,
     priority: 1
-    threads: HALF
     benchmark:
         "results/benchmarks/claims.tsv"
     run:
-        step("claims", input, output, params, wildcards, threads)
+        step("claims", input, output, params, wildcards)

@@ -24,13 +24,9 @@ def modules(script, **options):
     return [] if STORED else [str(path), *rests_on(path, **options)]
 
 
-# What has much to do side by side takes half of the cores: on two of them one, as another step is at work beside it.
-HALF = max(1, (workflow.cores or 2) // 2)
-
-
-def step(script, input, output, params, wildcards, threads):
+def step(script, input, output, params, wildcards):
     """Run a script as a rule's step: in a process of its own that has its packages already, or that is the job's."""
-    told = {"input": input, "output": output, "params": params, "wildcards": wildcards, "threads": threads}
+    told = {"input": input, "output": output, "params": params, "wildcards": wildcards}
     (step_server.run_forked if workflow.is_main_process else step_server.run_here)(f"scripts/{script}.py", told)
 
 

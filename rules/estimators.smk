@@ -27,7 +27,7 @@ rule estimator_errors:
     benchmark:
         "results/benchmarks/estimator_errors.tsv"
     run:
-        step("monte_carlo", input, output, params, wildcards, threads)
+        step("monte_carlo", input, output, params, wildcards)
 
 
 use rule ensemble as many_errors with:
@@ -71,7 +71,7 @@ rule draw_estimators:
     benchmark:
         "results/benchmarks/draw_estimators.tsv"
     run:
-        step("draw", input, output, params, wildcards, threads)
+        step("draw", input, output, params, wildcards)
 
 
 use rule draw_estimators as draw_many_errors with:

@@ -14,7 +14,7 @@ rule ensemble:
     benchmark:
         "results/benchmarks/ensemble.{case}.tsv"
     run:
-        step("monte_carlo", input, output, params, wildcards, threads)
+        step("monte_carlo", input, output, params, wildcards)
 
 
 rule rates:
@@ -24,7 +24,7 @@ rule rates:
     output:
         table="results/monte_carlo.csv",
     run:
-        step("join", input, output, params, wildcards, threads)
+        step("join", input, output, params, wildcards)
 
 
 rule monte_carlo:
@@ -36,4 +36,4 @@ rule monte_carlo:
     params:
         noise=STUDY.noise,
     run:
-        step("pages", input, output, params, wildcards, threads)
+        step("pages", input, output, params, wildcards)

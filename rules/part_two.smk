@@ -48,11 +48,10 @@ for _chapter, _contents in CHAPTERS.items():
             study=CLAIM_SETTINGS,
             own=PART_TWO.plain()[_chapter],
         priority: 1
-        threads: HALF
         benchmark:
             f"results/benchmarks/chapter.{_chapter}.tsv"
         run:
-            step("chapter", input, output, params, wildcards, threads)
+            step("chapter", input, output, params, wildcards)
 
 
 # Ladders of the records that are there; of another folder of data, or when a file comes or goes, they are made anew.
@@ -70,7 +69,7 @@ rule ladders:
     benchmark:
         "results/benchmarks/chapter.measured.tsv"
     run:
-        step("ladders", input, output, params, wildcards, threads)
+        step("ladders", input, output, params, wildcards)
 
 
 rule part_two_claims:
@@ -83,7 +82,7 @@ rule part_two_claims:
     benchmark:
         "results/benchmarks/part_two_claims.tsv"
     run:
-        step("part_two", input, output, params, wildcards, threads)
+        step("part_two", input, output, params, wildcards)
 
 
 for _chapter, _contents in CHAPTERS.items():
@@ -102,7 +101,7 @@ for _chapter, _contents in CHAPTERS.items():
         benchmark:
             f"results/benchmarks/draw_chapter.{_chapter}.tsv"
         run:
-            step("part_two", input, output, params, wildcards, threads)
+            step("part_two", input, output, params, wildcards)
 
 
 PART_TWO_BENCHMARKS = [f"results/benchmarks/chapter.{chapter}.tsv" for chapter in CHAPTERS]

@@ -15,4 +15,4 @@ rule record:
     benchmark:
         "results/benchmarks/record.{case}.tsv"
     run:
-        step("make_record", input, output, params, wildcards, threads)
+        step("make_record", input, output, params, wildcards)

@@ -55,7 +55,7 @@ for _name, _case in STRUCTURES.cases.items():
         benchmark:
             f"results/benchmarks/structure.{_name}.tsv"
         run:
-            step("structure_case", input, output, params, wildcards, threads)
+            step("structure_case", input, output, params, wildcards)
 
     rule:
         name:

@@ -35,7 +35,7 @@ rule parameters:
     params:
         without=["note"],
     run:
-        step("join", input, output, params, wildcards, threads)
+        step("join", input, output, params, wildcards)
 
 
 rule summary:
@@ -69,7 +69,7 @@ rule summary:
         titles=STRUCTURE_TITLES,
         tables=TABLE_PAGES,
     run:
-        step("pages", input, output, params, wildcards, threads)
+        step("pages", input, output, params, wildcards)
 
 
 # Both parts on one page with one table of contents.
@@ -94,4 +94,4 @@ rule study_page:
         pictures=PICTURES + STRUCTURE_PICTURES + PART_TWO_PICTURES,
         titles=STRUCTURE_TITLES,
     run:
-        step("pages", input, output, params, wildcards, threads)
+        step("pages", input, output, params, wildcards)

@@ -1,7 +1,6 @@
 """How much may run at once."""
 
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -10,22 +9,11 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-_granted = sys.maxsize
-
-
-def grant(number: int) -> None:
-    """Let this process use so many cores at most from here on.
-
-    Beside other steps more threads do no more: they wait for each other to leave the interpreter.
-    """
-    global _granted
-    _granted = number
-
-
 def cores() -> int:
     """Cores that this process may use, which a batch system or a container may hold below those of the machine."""
-    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # Linux tells
-    return min(there, _granted)
+    if hasattr(os, "sched_getaffinity"):  # Linux alone tells
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def side_by_side(

@@ -14,7 +14,6 @@ from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 
-from study.support.cores import grant
 from study.support.errors import StudyError
 
 FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
@@ -33,8 +32,6 @@ def preload(scripts: Iterable[str]) -> None:
 def run_forked(script: str, step: Mapping[str, Any]) -> None:
     """Run a script that finds ``step``, plain data, as its ``snakemake``; it may be called from several threads.
 
-    It uses as many cores as the step has ``threads``.
-
     Raises
     ------
     StudyError
@@ -51,6 +48,5 @@ def run_forked(script: str, step: Mapping[str, Any]) -> None:
 
 
 def run_here(script: str, step: Mapping[str, Any]) -> None:
-    """Run a script in this process, on as many cores as the step has ``threads``; a ``SystemExit`` passes."""
-    grant(step["threads"])
+    """Run a script in this process; a ``SystemExit`` passes."""
     runpy.run_path(script, {"snakemake": SimpleNamespace(**step)})

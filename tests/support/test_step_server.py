@@ -4,14 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from study.support.cores import cores
 from study.support.errors import StudyError
 from study.support.step_server import run_forked
 
 SCRIPT = """
 import os, sys
 import json as preloaded
-from study.support.cores import cores
 ALREADY = os.getpid()
 if "snakemake" in globals():
     step = globals()["snakemake"]
@@ -19,7 +17,7 @@ if "snakemake" in globals():
     step.params["do"] == "refuse" and sys.exit(2)
     step.params["do"] == "fail" and 1 / 0
     with open(step.output, "w") as file:
-        file.write(f"{os.getppid()} {os.getpid()} {cores()}")
+        file.write(f"{os.getppid()} {os.getpid()}")
 """
 
 
@@ -30,22 +28,17 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def asked(folder, name, do="write", threads=1):
-    run_forked("step.py", {"output": str(folder / name), "params": {"do": do}, "threads": threads})
+def asked(folder, name, do="write"):
+    run_forked("step.py", {"output": str(folder / name), "params": {"do": do}})
     return (folder / name).read_text().split()
 
 
 def test_steps_asked_for_at_once_are_children_of_one_process(folder):
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda number: asked(folder, str(number)), range(8)))
-    parents, own, granted = zip(*found, strict=True)
+    parents, own = zip(*found, strict=True)
     assert len(set(parents)) == 1
     assert len(set(own)) == 8
-    assert set(granted) == {"1"}
-
-
-def test_a_step_uses_as_many_cores_as_it_has_threads_and_no_more_than_there_are(folder):
-    assert asked(folder, "many", threads=1000)[-1] == str(cores())
 
 
 @pytest.mark.parametrize(("do", "code"), [("refuse", "2"), ("fail", "1"), ("die", "-9")])
