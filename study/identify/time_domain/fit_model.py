@@ -24,7 +24,6 @@ from study.identify.time_domain.continuation import NEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
-from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.no_response import (
     SURE,
     driven_at,
@@ -148,17 +147,13 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
-    """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term.
-
-    Not where the motion is chaotic: no start leads a single run to a minimum there, and segments come next.
-    """
+    """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term."""
     fit, reason = None, None
     try:
         fit = best_fit(model, prepared, first_starts(model, prepared))
     except StudyError as error:
         reason = error
-    nonlinear = any(term.name not in LINEAR for term in model.terms)
-    if nonlinear and (fit is None or not (fit.converged or is_chaotic(fit, prepared))):
+    if (fit is None or not fit.converged) and any(term.name not in LINEAR for term in model.terms):
         fit = better_fit(fit, _built_up(model, prepared))
     if fit is None:
         raise reason or StudyError(why_no_response(model, prepared))
