@@ -347,6 +347,7 @@ window.study = (() => {
 
   // ---- what is out of view is painted anew when it comes near it, or after what is in view
   const views = new Map(), resting = new Set(), NEAR = 200, SETTLED = 1500  // pixels; milliseconds
+  const SLIM = "(max-width: 1080px)", SHEET = [733, 1062]  // as in page.css; pixels: A4 within its margins
   function rest(shown, on) {
     if (on === resting.has(shown)) return
     resting[on ? "add" : "delete"](shown)
@@ -369,7 +370,13 @@ window.study = (() => {
       if (mine !== round) return
     }
   }
-  addEventListener("beforeprint", () => { for (const shown of [...resting]) rest(shown, false) })
+  addEventListener("beforeprint", () => {
+    for (const shown of [...resting]) rest(shown, false)
+    const {body} = document, wide = document.documentElement.clientWidth, slim = matchMedia(SLIM).matches
+    body.classList.toggle("slim", slim)  // in one column, on as many sheets as it takes; else on one
+    body.style.setProperty("--printed", Math.min(SHEET[0] / wide, slim ? 1 : SHEET[1] / body.scrollHeight))
+    body.style.setProperty("--window", `${wide}px`)
+  })
 
   async function draw(shown) {
     shown.classList.add("drawn")

@@ -97,6 +97,24 @@ def test_a_browser_draws_every_panel_of_it(kind: str, page: Page, tmp_path: Path
     assert len(re.findall(rb"/Type /Page\b", printed)) == 1, "it prints on one sheet"
 
 
+@pytest.mark.parametrize("width", [1000, 1400, 1920])
+def test_printing_keeps_the_layout_of_the_window_as_drawings_do_not_follow(
+    width: int, page: Page, tmp_path: Path
+) -> None:
+    (tmp_path / "page.html").write_bytes(saved(begun(DRIVEN)))
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto((tmp_path / "page.html").as_uri())
+    page.wait_for_function("window.study && window.study.ready")
+    wide = "[...document.querySelectorAll('[data-panel]')].map((p) => p.offsetWidth)"
+    shown = page.evaluate(wide)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    assert page.evaluate(wide) == pytest.approx(shown, rel=0.02)
+    page.emulate_media(media="null")  # none is emulated any longer
+    printed = page.pdf(format="A4", prefer_css_page_size=True)
+    assert (len(re.findall(rb"/Type /Page\b", printed)) == 1) == (width > 1080), "in one column it takes more sheets"
+
+
 def test_a_component_shows_its_dynamic_stiffness() -> None:
     comparison = begun(PRESCRIBED).now.comparison
     found = response_functions(comparison.prediction)
