@@ -23,7 +23,7 @@ from study.support.recent import Recent
 PLENTY = 8  # steps per sample with which a stable system is integrated stably
 TURN = 0.05  # rad in a step: an integrator of order four errs by about its fourth power, less than an effect
 METHODS = {"abm4": kernels.Method.ADAMS, "rk4": kernels.Method.ONE_BY_ONE}
-_DRIVES = Recent(most=32, largest=1 << 24)  # between their samples: several systems run under the same ones; of long ones none
+_DRIVES = Recent(most=32, largest=1 << 24)  # between samples: several systems run under the same; no long ones
 
 
 @dataclass(frozen=True)
