@@ -60,14 +60,9 @@ def _shown(number: int, row: Ranked) -> list[str]:
 
 
 def explained_share(gain: Gain) -> str:
-    """What an effect explains with its standard error, where that reaches the digits shown.
-
-    By how much a model is worse with an effect matters to nobody.
-    """
+    """What an effect explains with its standard error; by how much a model is worse with it matters to nobody."""
     if gain.explained < -max(gain.error, 0.05):
         return "worse"
-    if gain.error < 5e-4:
-        return percent(gain.explained, "z.1f")
     return percent(gain.explained, "z.1f", gain.error, ".1f")
 
 

@@ -145,7 +145,7 @@ class Ranking:
     def _repr_html_(self) -> str:
         rows = [
             [row.name, row.record, percent(row.error), percent(row.floor), str(row.fitted),
-             "-" if np.isnan(row.explained) else percent(row.explained, "z.1f", row.explained_error, ".1f"),
+             percent(row.explained, "z.1f", row.explained_error, ".1f"),
              "-" if np.isnan(row.p_value) else f"{row.p_value:.1g}"] for row in self.rows
         ]  # fmt: skip
         heads = ["model", "record", "held-out error", "noise floor", "fitted values", "first explains of it", "p"]

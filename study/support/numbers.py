@@ -12,14 +12,18 @@ ABSURD = 1e4  # a share beyond tells nothing but that there is none
 
 
 def percent(share: float, form: str = ".3g", error: float | None = None, error_form: str = ".1g") -> str:
-    """A share in percent, by Python's format codes: ``percent(0.0123, "+.3g", 0.001)`` is ``+1.23 +- 0.1 %``."""
+    """A share in percent, by Python's format codes: ``percent(0.0123, "+.3g", 0.001)`` is ``+1.23 +- 0.1 %``.
+
+    A standard error that is nothing in its digits is left out.
+    """
     if math.isnan(share):
         return "-"  # of nothing
     if abs(share) > ABSURD:
         return f"{'-' if share < 0.0 else ''}over {100.0 * ABSURD:.0f} %"
     if form == ".3g" and abs(share) >= 10.0:  # no exponents
         form = ".0f"
-    spread = "" if error is None else f" +- {100.0 * error:{error_form}}"
+    shown = "0" if error is None else f"{100.0 * error:{error_form}}"
+    spread = "" if float(shown) == 0.0 else f" +- {shown}"
     return f"{100.0 * share:{form}}{spread} %"
 
 

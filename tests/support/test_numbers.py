@@ -1,8 +1,10 @@
 """Numbers in words."""
 
+import math
+
 import pytest
 
-from study.support.numbers import by_chance, in_one_notation
+from study.support.numbers import by_chance, in_one_notation, percent
 
 
 @pytest.mark.parametrize(
@@ -24,3 +26,11 @@ def test_a_p_value_is_said_as_a_number_of_records(p_value: float, records: str) 
 )
 def test_the_ends_of_an_interval_are_written_alike(values: tuple[float, ...], shown: list[str]) -> None:
     assert in_one_notation(values, 5) == shown
+
+
+@pytest.mark.parametrize(
+    ("share", "error", "shown"),
+    [(0.318, 0.04, "31.8 +- 4.0 %"), (1.0, 4e-9, "100.0 %"), (1.0, 0.0, "100.0 %"), (math.nan, math.nan, "-")],
+)
+def test_a_standard_error_that_is_nothing_in_its_digits_is_left_out(share: float, error: float, shown: str) -> None:
+    assert percent(share, "z.1f", error, ".1f") == shown
