@@ -75,9 +75,11 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
             doubt = ". Most of what is judged is noise, which no model explains (--judge A:B names another part)"
         return f"{start}, which looks like noise{source}: hardly any of it is above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= TOLERANCE:
+        # a sum over frequencies, it may come out larger than the error, which is one over time
+        excess = percent(min(comparison.prediction.above_noise, comparison.prediction.error))
         return (
-            f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.above_noise)} of "
-            "the response, too little to say that anything is missing"
+            f"{start}; what stands above the noise floor of {floor} is {excess} of the response, too little to say that "
+            "anything is missing"
         )
     return f"{start}, where noise alone would leave {floor}"
 

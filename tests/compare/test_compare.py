@@ -19,6 +19,7 @@ from study.records.excitation import Excitation, force
 from study.records.plan import Plan, make_plan
 from study.records.prepared import prepare_record
 from study.records.record import Record
+from study.support.numbers import percent
 from study.trials import make_trial
 
 Floats = NDArray[np.float64]
@@ -83,6 +84,14 @@ def test_without_noise_and_without_a_hidden_effect_nothing_is_called_missing() -
     assert comparison.prediction.error < 1e-3
     assert comparison.forces[0].total < 0.01
     assert "unexplained lies" not in comparison_in_words(comparison)
+
+
+def test_no_more_is_said_to_stand_above_the_noise_than_the_error_is() -> None:
+    record = simulate(model(**VALUES), drive(), DT, Integrator("rk4", 8))
+    comparison = compared(model(), Record(DT, {"force": record["force"], "displacement": record["displacement"]}))
+    error = comparison.prediction.error
+    vars(comparison.prediction)["above_noise"] = 1.2 * error  # as the sum over frequencies may have it
+    assert f"is {percent(error)} of the response, too little" in comparison_in_words(comparison)
 
 
 # ---- something hidden
