@@ -78,8 +78,8 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
         # a sum over frequencies, it may come out larger than the error, which is one over time
         excess = percent(min(comparison.prediction.above_noise, comparison.prediction.error))
         return (
-            f"{start}; what stands above the noise floor of {floor} is {excess} of the response, too little to say that "
-            "anything is missing"
+            f"{start}; what stands above the noise floor of {floor} is {excess} of the response, too little to say "
+            "that anything is missing"
         )
     return f"{start}, where noise alone would leave {floor}"
 
