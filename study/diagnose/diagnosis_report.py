@@ -59,11 +59,11 @@ def _shown(number: int, row: Ranked) -> list[str]:
     ]  # fmt: skip
 
 
-def explained_share(gain: Gain) -> str:
-    """What an effect explains with its standard error; by how much a model is worse with it matters to nobody."""
+def explained_share(gain: Gain, with_error: bool = True) -> str:
+    """What an effect explains, with its standard error; by how much a model is worse with it matters to nobody."""
     if gain.explained < -max(gain.error, 0.05):
         return "worse"
-    return percent(gain.explained, "z.1f", gain.error, ".1f")
+    return percent(gain.explained, "z.1f", gain.error if with_error else None, ".1f")
 
 
 def shown_coefficient(value: float, half: float, unit: str) -> str:

@@ -9,15 +9,15 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.dependence import explained_by_place
 from study.compare.force_map import FEWEST_VISITS, surface
+from study.diagnose.diagnosis_report import explained_share
 from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.explore.axis_scales import Focus
-from study.explore.page_units import in_percent, in_text, with_error
+from study.explore.page_units import in_percent, in_sentence, in_text, with_error
 from study.explore.session import Stage
 from study.explore.words import in_words
 from study.figures.sketch import Link, Sketch, svg
-from study.support.numbers import percent
 
 NAMED_AS_TRIED = 8  # candidates of one place
 READ = "a dash: below zero; a dot: may be noise"
@@ -96,8 +96,7 @@ def _terms_there(comparison: Comparison, path: frozenset[str]) -> str:
 
 
 def _tried(row: Ranked) -> str:
-    share = percent(row.gain.explained, "z.1f", row.gain.error, ".1f").replace("+-", "±")
-    return f"{escape(in_words(row.term.name))} ({share})"
+    return f"{escape(in_words(row.term.name))} ({in_sentence(explained_share(row.gain))})"
 
 
 def _modes(stage: Stage) -> str:

@@ -11,6 +11,7 @@ from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.varying_coefficients import VaryingCoefficient, varying_in_words
+from study.diagnose.diagnosis_report import explained_share
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, Diagnosis
@@ -169,7 +170,7 @@ def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
 def _row(number: int, row: Ranked, rank: str, stage: Stage, live: bool) -> str:
     """One row: an effect or a set of them, what it explains, and the words that are shown when it is pointed at."""
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
-    explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} %"
+    explained = explained_share(row.gain, with_error=False)
     names = [_name(entry) for entry in row.entries]
     shown = "".join(f"<b>{name}</b>{f' <i>{place}</i>' if place else ''}" for name, place in names)
     spoken = ", ".join(" ".join(name).strip() for name in names)
@@ -202,8 +203,9 @@ def _detail(row: Ranked) -> str:
         where = f" {escape(place_in_words(effect.entry.place))}" if at else ""
         formula = escape(in_text(term.formula))
         effects.append(f"<b>{words}</b>{where} <i>{formula}</i>, coefficient <em>{escape(size)}</em>")
-    said = f"{'; '.join(effects)}; {'explains' if len(effects) == 1 else 'together they explain'} "
-    said += f"{100.0 * row.gain.explained:z.1f} ± {100.0 * row.gain.error:.1f} %, error with "
+    share = in_sentence(explained_share(row.gain))
+    explains = "explains" if len(effects) == 1 else "together they explain"
+    said = f"{'; '.join(effects)}; {explains} {share if share != 'worse' else 'none of it'}, error with "
     said += f"{'it' if len(effects) == 1 else 'them'} {in_percent(row.response_error)}."
     if len(effects) == 1:
         said += f" {escape(row.term.meaning[0].upper() + row.term.meaning[1:])}."

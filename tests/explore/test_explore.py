@@ -26,6 +26,7 @@ from study.explore.saved import files, of_stage, saved
 from study.explore.view import View, history_columns
 from study.records.prepared import prepare_record
 from study.support.errors import StudyError
+from study.support.statistics import Gain
 
 TEXT = """# the rig in hall 3
 name: rig
@@ -317,6 +318,18 @@ def test_a_set_of_effects_is_a_row_whose_click_adds_all_of_it(asked):
     assert "Several effects are missing" in said["verdict"]
     assert View(stage, 0).of_sensor("displacement")["would_time"].keys() == {str(i) for i in range(len(stage.shown))}
     assert sessions.candidate(replace(asked, stages=(stage,)), both.name) is both
+
+
+def test_by_how_much_an_effect_is_worse_is_not_said_nor_an_error_of_nothing(asked, monkeypatch):
+    monkeypatch.setattr(words, "offers", lambda *_: True)  # as one of the user's own always is
+    first, second = asked.now.diagnosis.candidates[:2]
+    sure = replace(first, gain=Gain(1.0, 1e-6, 0.0), tied_with=())
+    worse = replace(second, gain=Gain(-7.277, 0.3, 1.0), tied_with=())
+    stage = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=(sure, worse)))
+    html = words.words(stage, 0, True)["candidates"]
+    assert "explains 100.0 %, error" in html
+    assert "727" not in html
+    assert "± 0" not in html
 
 
 def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
