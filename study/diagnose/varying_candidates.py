@@ -11,7 +11,7 @@ import numpy as np
 
 from study.compare.comparison import Comparison, compare
 from study.compare.prediction import Prediction, predict
-from study.diagnose.candidates import FittedCandidate, judged_candidate
+from study.diagnose.candidates import FittedCandidate, Progress, judged_candidate
 from study.equations.laid_variations import laid_entry
 from study.equations.model import ModelTerm, free
 from study.equations.variation import ALONG_TIME, Shape, varying
@@ -47,14 +47,17 @@ def first_of_all(tried: Sequence[FittedCandidate], changes: PromisedChanges, com
     return power > 0.0 and changes.together >= 1.0 - least / power
 
 
-def explains_more(changes: PromisedChanges, effects: Sequence[str]) -> bool:
+def explains_more(changes: PromisedChanges, effects: Sequence[str], progress: Progress | None = None) -> bool:
     """Whether a promised change, fitted, leaves less than the model with these effects alone, or does for one of them.
 
     What the sensitivities promise of what others leave is seldom kept, and costs a search of its own where it is.
     """
     prepared, fit, entries = changes.prepared, changes.fit, list(changes.shares)
+    most, doing = len(entries) + len(effects), "coefficients that vary"
     whole = predict(fit, prepared)
-    for found in side_by_side(lambda entry: _with(fit, entry, prepared), entries):
+    for count, found in enumerate(side_by_side(lambda entry: _with(fit, entry, prepared), entries), start=1):
+        if progress is not None:
+            progress(count, most, doing)
         if found is None:
             continue
         gain = statistics.gain(whole.residual, found.residual)
@@ -72,7 +75,12 @@ def explains_more(changes: PromisedChanges, effects: Sequence[str]) -> bool:
         found = _with(fewer, entries[0], prepared)
         return found is not None and statistics.worse(found.residual, whole.residual) < K
 
-    return any(side_by_side(stands_for, effects))
+    for count, stands in enumerate(side_by_side(stands_for, effects), start=len(entries) + 1):
+        if progress is not None:
+            progress(count, most, doing)
+        if stands:
+            return True
+    return False
 
 
 def _with(fit: FreeRunFit, entry: ModelTerm, prepared: Prepared) -> Prediction | None:

@@ -140,7 +140,7 @@ def diagnose(
         return found
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
-    if changes is None or not varying_candidates.explains_more(changes, named[0].names):
+    if changes is None or not varying_candidates.explains_more(changes, named[0].names, progress):
         return found
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     return found if other is None or not other.changes else other
