@@ -40,10 +40,6 @@ def varying_figure(found: Sequence[VaryingCoefficient], record: str) -> Figure:
     )  # fmt: skip
     for panel, one in zip(axes, found, strict=True):
         varying_panel(panel, one)
-    words = [
-        f"{term_names(one.entry.term.variation.of.name)}, {one.unknowns:.1f} unknowns"
-        for one in found if one.entry.term.variation
-    ]  # fmt: skip
-    page.letter(axes, tuple(words))
+    page.letter(axes, tuple(f"{term_names(one.entry.name)}, {one.unknowns:.1f} unknowns" for one in found))
     page.shared_legend(figure, axes)
     return figure

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
 from study.compare import history
@@ -26,6 +27,7 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/step_0/structure.png": "where a force is missing from the structure as given",
     "climb/step_0/candidates.png": "what could be missing from the model as given",
     "climb/step_0/constancy.png": "the test of a constant coefficient: a true effect has one",
+    "climb/varying.png": "coefficients that vary, final model",
     "climb/decay.png": "frequency and damping ratio against amplitude, final model",
     "climb/loops.png": "loops of the force, final model",
     "climb/response.png": "final model and measurement",
@@ -33,6 +35,7 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/force_error.png": "unexplained force by frequency, final model",
 }
 DOCUMENTED_PICTURES = (
+    "climb/varying.png",
     "climb/decay.png",
     "climb/loops.png",
     "climb/step_0/structure.png",
@@ -58,8 +61,9 @@ class Literature(TableRow):
 class Published(TableRow):
     """One row of ``config/published.tsv``: a value that others give.
 
-    ``key`` names a coefficient as histories do, a quotient of two with a stroke between, or of a free decay
-    ``frequency`` or ``damping`` with ``.loudest``, ``.largest`` or ``.quiet``.
+    ``key`` names a coefficient as histories do, a quotient of two with a stroke between, of a free decay ``frequency``
+    or ``damping`` with ``.loudest``, ``.largest`` or ``.quiet``, or of a mass whose stiffness varies ``frequency.at``
+    and what it varies with.
     """
 
     record: Text
@@ -138,6 +142,8 @@ def found_beside(row: Published, found: RecordFindings) -> Beside:
         return Beside(row, *_of_decay(found.reached.get("decay"), what, where))
     step = found.steps[0 if row.step == "given" else -1]
     values = {c["key"]: c for c in step["coefficients"]}
+    if what == "frequency" and where.startswith("at "):
+        return Beside(row, *_natural_frequency(found.reached, values["m"]["value"], float(where.removeprefix("at "))))
     over, _, under = row.key.partition("/")
     if over not in values or (under and under not in values):
         return Beside(row, None, None)
@@ -162,6 +168,16 @@ def _of_decay(decay: Fields | None, what: str, where: str) -> tuple[float | None
         error = (sum((values[j] - mean) ** 2 for j in quiet) / (len(quiet) * (len(quiet) - 1))) ** 0.5
         return mean, (mean - 1.96 * error, mean + 1.96 * error)
     return values[i], (values[i] - 1.96 * errors[i], values[i] + 1.96 * errors[i])
+
+
+def _natural_frequency(reached: Fields, mass: float, at: float) -> tuple[float | None, tuple[float, float] | None]:
+    """Of a mass on a stiffness that varies, where that with which it does has a value; in hertz."""
+    stiffness = next((one for one in reached.get("varying", ()) if one["coefficient"] == "k"), None)
+    if stiffness is None:
+        return None, None
+    value, error = (float(np.interp(at, stiffness["at"], stiffness[name])) for name in ("value", "error"))
+    low, found, high = np.sqrt((value + 1.96 * error * np.array([-1.0, 0.0, 1.0])) / mass) / (2.0 * np.pi)
+    return float(found), (float(low), float(high))
 
 
 @dataclass(frozen=True)

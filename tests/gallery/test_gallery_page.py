@@ -1,6 +1,7 @@
 """The gallery from what climbs leave: what is left is said as it is, and nothing is fetched from anywhere."""
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -47,7 +48,9 @@ def folder(tmp_path):
         "frequency": [42.0, 40.0, 37.0, 36.8], "frequency_error": [0.1] * 4,
         "damping": [0.004, 0.008, 0.01, 0.002], "damping_error": [0.0001, 0.0001, 0.02, 0.001],
     }  # fmt: skip
-    write("climb/comparison.json", {"model": {"equation": "c [v] = F"}, "decay": {"measured": decay}})
+    stiffness = {"coefficient": "k", "at": [1.0, 3.0], "value": [500.0, 1100.0], "error": [40.0, 40.0]}
+    reached = {"model": {"equation": "c [v] = F"}, "decay": {"measured": decay}, "varying": [stiffness]}
+    write("climb/comparison.json", reached)
     (tmp_path / "run" / "climb" / "loops.png").write_bytes(PNG)
     return tmp_path / "run"
 
@@ -111,6 +114,14 @@ def test_the_last_of_ten_diagnoses_counts(folder):
 def test_values_beside_those_published(folder, key, at, found):
     value = found_beside(published(key, at), read_findings(folder, "run")).found
     assert value == (None if found is None else pytest.approx(found))
+
+
+def test_the_frequency_follows_what_the_stiffness_varies_with(folder):
+    steps = {"steps": [step(0.5, m=2.0), step(0.1, "linear_stiffness_over_pin", m=2.0, k=500.0)]}
+    (folder / "history.json").write_text(json.dumps(steps))
+    row = found_beside(published("frequency.at 2"), read_findings(folder, "run"))
+    assert row.found == pytest.approx((800.0 / 2.0) ** 0.5 / (2.0 * math.pi))
+    assert row.interval == pytest.approx([((800.0 + d * 78.4) / 2.0) ** 0.5 / (2.0 * math.pi) for d in (-1, 1)])
 
 
 def test_a_row_says_by_how_much_a_value_differs(folder):
