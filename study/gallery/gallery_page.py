@@ -4,6 +4,7 @@ It is one page for a browser, and blocks of the documentation: words, tables and
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,8 +177,10 @@ def _natural_frequency(reached: Fields, mass: float, at: float) -> tuple[float |
     if stiffness is None:
         return None, None
     value, error = (float(np.interp(at, stiffness["at"], stiffness[name])) for name in ("value", "error"))
-    low, found, high = np.sqrt((value + 1.96 * error * np.array([-1.0, 0.0, 1.0])) / mass) / (2.0 * np.pi)
-    return float(found), (float(low), float(high))
+    low, found, high = (
+        math.sqrt(max(value + 1.96 * errors * error, 0.0) / mass) / (2.0 * math.pi) for errors in (-1, 0, 1)
+    )
+    return found, (low, high)
 
 
 @dataclass(frozen=True)
