@@ -156,7 +156,7 @@ def _open(text: str, without: str = "") -> str:
 def _keep_sensors(path: Path, columns: list[str]) -> None:
     import pandas as pd
 
-    pd.read_csv(path, float_precision="round_trip")[columns].to_csv(path, index=False, float_format="%.17g")
+    pd.read_csv(path)[columns].to_csv(path, index=False, float_format="%.17g")
 
 
 def _run(code: Path, made: Path, folder: Path, name: str, keep: bool) -> dict[str, Any]:
