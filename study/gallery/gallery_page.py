@@ -176,9 +176,10 @@ def _natural_frequency(reached: Fields, mass: float, at: float) -> tuple[float |
     stiffness = next((one for one in reached.get("varying", ()) if one["coefficient"] == "k"), None)
     if stiffness is None:
         return None, None
-    value, error = (float(np.interp(at, stiffness["at"], stiffness[name])) for name in ("value", "error"))
+    along, values, errors = (np.array(stiffness[name], dtype=np.float64) for name in ("at", "value", "error"))
+    value, error = float(np.interp(at, along, values)), float(np.interp(at, along, errors))
     low, found, high = (
-        math.sqrt(max(value + 1.96 * errors * error, 0.0) / mass) / (2.0 * math.pi) for errors in (-1, 0, 1)
+        math.sqrt(max(value + side * 1.96 * error, 0.0) / mass) / (2.0 * math.pi) for side in (-1, 0, 1)
     )
     return found, (low, high)
 
