@@ -171,7 +171,7 @@ COMMAND = Command(
     "  study diagnose table.csv --absolute --model rig.yaml  # a moving base: its column is base_acceleration\n"
     "  study diagnose axis.csv --model axis.yaml  # no spring: nothing in the model depends on the displacement\n"
     "  study diagnose frame.csv --model frame.yaml  # a structure: the effect and its place\n"
-    "  study diagnose sweep.csv --model rig.yaml  # judged in every other block, if its halves have other frequencies\n"
+    "  study diagnose sweep.csv --model rig.yaml  # judged in every other block, if its halves differ in frequency\n"
     "  study diagnose rig.csv --model rig.yaml --candidate \"bracket=u*abs(u) + 0.1*v**3\" --without hysteresis",
     _arguments, _run,
 )  # fmt: skip

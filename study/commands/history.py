@@ -7,7 +7,7 @@ from study.commands.command import Command
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("model", type=Path, help="model file (YAML) that 'study add' has added to")
+    parser.add_argument("model", type=Path, help="model file (YAML) that 'study add' or 'drop' changed")
     parser.add_argument("--out", type=Path, help="also draw the history and write history.json there")
 
 
@@ -18,7 +18,7 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     steps = history.read_history(arguments.model)
     if not steps:
-        print(f"{arguments.model}: nothing was added yet; 'study add' starts the history")
+        print(f"{arguments.model}: no history yet; 'study add' and 'drop' keep one")
         return
     print(history.history_table(steps))
     if arguments.out is not None:

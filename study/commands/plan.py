@@ -20,8 +20,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     limits = parser.add_argument_group("limits of the test (default: what this record reached)")
     limits.add_argument(
         "--max-force", type=finite_number(above=0.0), metavar="VALUE",
-        help="largest force, in the unit of the record; of a moving base its largest acceleration in m/s^2, of "
-        "motions in mm in mm/s^2",
+        help="largest force, in the unit of the record; of a moving base its largest acceleration in m/s^2 "
+        "(mm/s^2 for motions in mm)",
     )  # fmt: skip
     limits.add_argument(
         "--max-displacement", type=finite_number(above=0.0), metavar="VALUE", help="largest displacement anywhere"
@@ -46,7 +46,7 @@ def _precision(text: str) -> tuple[str, float]:
     except ValueError:
         share = 0.0
     if found is None or not 0.0 < share < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no value and width such as k3=5%")
+        raise argparse.ArgumentTypeError(f"{text!r} is no value and width such as k3=5% (above 0, below 100 %)")
     return found["key"], share
 
 

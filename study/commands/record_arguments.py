@@ -61,7 +61,7 @@ def add_out_argument(parser: argparse.ArgumentParser, out: str = "folder for res
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """How to read records, what to fit and what to judge."""
-    reading = parser.add_argument_group("reading (or in RECORD.record.yaml beside the file)")
+    reading = parser.add_argument_group("reading (all but --absolute also in RECORD.record.yaml beside the file)")
     reading.add_argument(
         "--column", action="append", default=[], metavar="ROLE=NAME",
         help="column of force, displacement, velocity, acceleration, time, or of a further channel; by name or number",
@@ -103,7 +103,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging.add_argument(
         "--judge", type=judged_samples, metavar="A:B",
         help=f"samples to judge (default: the second half), or '{ALTERNATE}': the default of free decays, "
-        "components, several stretches, and sweeps whose halves have other frequencies",
+        "components, several stretches, and sweeps whose halves differ in frequency",
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=time_span, default=[], metavar="S:T",

@@ -67,10 +67,11 @@ def revise(
     errors = [(percent(b.prediction.error), percent(a.prediction.error)) for b, a in zip(before, after, strict=True)]
     rises = all(a.prediction.error > b.prediction.error for b, a in zip(before, after, strict=True))
     if added and rises and not arguments.anyway and all(b != a for b, a in errors):
-        rows, name = ", ".join(f"from {b} to {a}" for b, a in errors), term_names(added)
+        several, name = len(records) > 1, term_names(added)
+        each = [f"from {b} to {a}{f' in {r.name}' * several}" for r, (b, a) in zip(records, errors, strict=True)]
         print(comparison_summary(after))
         print(
-            f"\n{name[0].upper()}{name[1:]} raises the error of what was not fitted, {rows}: {arguments.model} is left "
+            f"\n{name[0].upper()}{name[1:]} raises the held-out error, {', '.join(each)}: {arguments.model} is left "
             "as it was, and nothing is written (--anyway adds it all the same)."
         )
         return

@@ -62,7 +62,7 @@ def _run(arguments: argparse.Namespace) -> None:
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model, dt = read_model(arguments.model), arguments.dt
     expect(model.named or "inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")
-    lacking = f"model {model.name!r} has no 'forces'; expected where the force acts, such as"
+    lacking = f"{arguments.model}: the model has no 'forces'; expected where the force acts, such as"
     expect(model.forces, f"{lacking} {{shaker: {model.coordinates[0]}}}")
     with at(arguments.model):
         values = model.numbers()
@@ -83,7 +83,7 @@ def _run(arguments: argparse.Namespace) -> None:
     driven = ", ".join(f"{name} of rms {size:.4g} N" for name, size in sizes)
     print(f"{arguments.out}: {len(record)} samples, {arguments.samples * dt:g} s of {model.name}, {driven}")
     if changed > TOLERANCE:
-        print(f"with twice as many as the {steps} steps a sample a motion changes by {percent(changed)} of its rms")
+        print(f"with twice the {steps} steps per sample, a motion changes by {percent(changed)} of its rms")
     if modes:
         print(modes_table(modes, model.coordinates))
 

@@ -22,7 +22,7 @@ MEASURED_RECORDS = "Measured records"
 VERDICTS_IN_WORDS = {
     "missing_effect": "an effect is missing", "missing_effects": "several effects are missing",
     "partly_known": "effects are missing, and something that has no name", "nothing_missing": "nothing is missing",
-    "unknown_effect": "something unknown is missing",
+    "unknown_effect": "something is missing that no candidate explains",
 }  # fmt: skip
 By = Literal["record", "level", "date"]
 DATED = re.compile(r"(?<![0-9])((?:19|20)[0-9]{2})[-_.]?([01][0-9])[-_.]?([0-3][0-9])(?![0-9])")

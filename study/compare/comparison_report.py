@@ -435,8 +435,8 @@ def _headline(comparison: Comparison) -> str:
     if comparison.model.named and comparison.missing.equations:
         force += f"{',' if force else '; force:'} rms that the equation of motion leaves"
     return (
-        f"model {comparison.model.name}: fitted to samples {fit[0]} to {fit[1]}{by}, judged on {judge[0]} to "
-        f"{judge[1]}\nresponse: free run, rms difference over rms {response}{force}"
+        f"model {comparison.model.name}: fitted to samples {fit[0]}:{fit[1]}{by}, judged on "
+        f"{judge[0]}:{judge[1]}\nresponse: free run, rms difference over rms {response}{force}"
     )
 
 

@@ -14,7 +14,7 @@ from study.support.numbers import percent
 from study.support.yaml_text import shown
 
 Step = dict[str, Any]
-STEPS_FILE = "the steps as 'study add' writes them"
+STEPS_FILE = "the steps that 'study add' or 'drop' writes"
 STEP_FIELDS: Mapping[str, Any] = {  # what a step holds
     "terms": list, "record": str, "unit": str, "rms": int | float, "error.response": int | float,
     "error.force": int | float | NoneType, "noise_floor.response": int | float, "added": str | NoneType,

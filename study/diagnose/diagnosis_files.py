@@ -91,9 +91,10 @@ def diagnosis_files(
 
 
 def modes_before_and_after(diagnosis: Diagnosis) -> str:
-    """The modes of a structure as given, and with what is missing."""
+    """The modes of a structure as fitted, and with what is missing."""
     comparison, after = diagnosis.comparison, diagnosis.modes_after
     before = modes_table(comparison.modes, comparison.model.coordinates)
     if after is None:
         return f"modes\n{before}"
-    return f"modes of the model as given\n{before}\n\nmodes with it\n{modes_table(after, comparison.model.coordinates)}"
+    with_it = modes_table(after, comparison.model.coordinates)
+    return f"modes of the model as fitted\n{before}\n\nmodes with what is missing\n{with_it}"

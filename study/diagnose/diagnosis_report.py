@@ -7,6 +7,7 @@ from typing import Any
 
 from tabulate import tabulate
 
+from study.diagnose.diagnosis_sentences import all_asked
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.equations.terms import LIBRARY
@@ -28,7 +29,7 @@ def candidate_table(diagnosis: Diagnosis) -> str:
     more, unfitted = len(diagnosis.candidates) - len(listed), diagnosis.asked - len(diagnosis.candidates)
     said = [f"... and {more} more, in diagnosis.json"] if more > 0 else []
     said += [_why_this_order(diagnosis)] if _contradicts([row for _, row in listed]) else []
-    said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to fit"] if unfitted else []
+    said += [f"{unfitted} of {all_asked(diagnosis)} explain too little, or cannot be fitted"] if unfitted > 0 else []
     return "\n".join([shown, "; ".join(said)]) if said else shown
 
 
@@ -60,10 +61,10 @@ def _shown(number: int, row: Ranked) -> list[str]:
 
 
 def explained_share(gain: Gain, with_error: bool = True) -> str:
-    """What an effect explains, with its standard error; by how much a model is worse with it matters to nobody."""
+    """What an effect explains, with half of its 95 % interval; how much worse a model is with it matters to nobody."""
     if gain.explained < -max(gain.error, 0.05):
         return "worse"
-    return percent(gain.explained, "z.1f", gain.error if with_error else None, ".1f")
+    return percent(gain.explained, "z.1f", 1.96 * gain.error if with_error else None, ".1f")
 
 
 def shown_coefficient(value: float, half: float, unit: str) -> str:

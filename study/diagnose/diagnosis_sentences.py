@@ -1,7 +1,9 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
+import math
 from collections.abc import Sequence
 
+from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import varying_in_words
 from study.diagnose import verdict
 from study.diagnose.constancy import wavers
@@ -12,7 +14,7 @@ from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
 from study.support.numbers import by_chance, digits_between, enumerated, in_one_notation, percent
-from study.support.thresholds import ALPHA, UNSTEADY
+from study.support.thresholds import ALPHA, TOLERANCE, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 NAMED = 3  # effects that cannot be told apart, before the others are counted
@@ -42,25 +44,45 @@ def diagnosis_sentences(diagnosis: Diagnosis, amounts: bool = True) -> list[str]
 def _nothing(diagnosis: Diagnosis) -> str:
     where = " at any place" if diagnosis.comparison.model.named else ""
     prediction = diagnosis.comparison.prediction
-    return (
-        f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
-        f"{percent(prediction.error)}, where noise alone would leave {percent(prediction.floor)}, and what is left "
-        f"looks like noise: it depends neither on the motion{where}, nor on its past, nor on time. None of "
-        f"{_all_asked(diagnosis)} explains any of it."
+    sizes = (
+        f"the error of {_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
+        f"{percent(prediction.floor)}"
     )
+    seen = next((r for r in diagnosis.candidates if _matters_little(r, prediction)), None)
+    if seen is not None:
+        effect = effect_in_words(seen.entry)
+        return (
+            f"Nothing is missing that matters at this level: {sizes}. {effect[0].upper()}{effect[1:]} explains "
+            f"{percent(seen.gain.explained, '.1f')} of its mean square, which chance does not, but less than "
+            f"{percent(TOLERANCE)} of the response counts as nothing: excite harder and ask again."
+        )
+    return (
+        f"Nothing is missing that this record could show: {sizes}, and what is left looks like noise: it depends "
+        f"neither on the motion{where}, nor on its past, nor on time. None of {all_asked(diagnosis)} explains any of "
+        "it."
+    )
+
+
+def _matters_little(row: Ranked, prediction: Prediction) -> bool:
+    """Whether an effect explains a part of the error by no chance, but one that is practically nothing."""
+    low, high = row.effect.interval
+    gained = math.sqrt(max(prediction.error**2 - row.response_error**2, 0.0))
+    sure = row.p_value < ALPHA and not low <= 0.0 <= high and row.gain.explained > DEPENDENCE
+    return sure and not row.unphysical and gained <= TOLERANCE
 
 
 def _misses_much(diagnosis: Diagnosis) -> str:
     prediction = diagnosis.comparison.prediction
     return (
-        f"No known effect is missing, but the model does not describe this record: the error of "
+        f"The model does not describe this record, and no known effect is what it lacks: the error of "
         f"{_response(diagnosis)} is {percent(prediction.error)}, where noise alone would leave "
-        f"{percent(prediction.floor)}. None of {_all_asked(diagnosis)} explains it. Other modes may show, or a force "
+        f"{percent(prediction.floor)}. None of {all_asked(diagnosis)} explains it. Other modes may show, or a force "
         "that was not measured: --near and --up-to choose one mode, 'linear: modal' in the model file takes several."
     )
 
 
-def _all_asked(diagnosis: Diagnosis) -> str:
+def all_asked(diagnosis: Diagnosis) -> str:
+    """How many candidates were asked for: ``126 effects and places``."""
     return f"{diagnosis.asked} {'effects and places' if diagnosis.comparison.model.named else 'candidates'}"
 
 
@@ -103,7 +125,7 @@ def _missing(diagnosis: Diagnosis, amounts: bool) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is still unexplained beside it, and is not noise.")
     if first.unphysical:
-        said.append(f"As fitted it is {'unusual' if first.seldom else 'not physical'}: {first.unphysical}.")
+        said.append(f"{doubted('it', first)}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
@@ -128,12 +150,19 @@ def _several(diagnosis: Diagnosis, answer: Ranked, amounts: bool) -> list[str]:
     if diagnosis.left > 0.0:
         said.append(f"{percent(diagnosis.left)} of the response is left beside {them}{_depending(diagnosis)}.")
     if answer.unphysical:
-        said.append(f"As fitted one of them is {'unusual' if answer.seldom else 'not physical'}: {answer.unphysical}.")
+        said.append(f"{doubted('it' if one else 'one of them', answer)}.")
     if len(diagnosis.sets) > 1:
         count = len(diagnosis.sets)
         often = [f"{term_names(name)} in {'all' if n == count else n}" for name, n in diagnosis.included.items()]
-        said.append(f"The record cannot tell {count} such sets apart. Of these, {enumerated(often)}.")
+        said.append(f"This record cannot tell {count} such sets apart, with {enumerated(often)}.")
     return said
+
+
+def doubted(who: str, row: Ranked) -> str:
+    """Why values as fitted are doubted: they do not act, are seldom met, or are those of nothing physical."""
+    if row.unphysical == row.idle:
+        return f"As fitted, {row.idle}"
+    return f"As fitted {who} is {'unusual' if row.seldom else 'not physical'}: {row.unphysical}"
 
 
 def _with_alike(entry: ModelTerm, diagnosis: Diagnosis) -> str:
@@ -187,13 +216,13 @@ def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
 
 
 def _amount(effect: FittedEffect) -> str:
-    """Coefficient and shape parameters with their errors."""
+    """Coefficient and shape parameters with their 95 % intervals, or half of them."""
     low, high = effect.interval
     digits = digits_between(effect.coefficient, high - low)
     coefficient, low_end, high_end = in_one_notation((effect.coefficient, low, high), digits)
     said = f"{coefficient} {effect.unit} (95 % interval {low_end} to {high_end})"
     parts = [
-        f"{name} = {value:.4g} +- {effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
+        f"{name} = {value:.4g} +- {1.96 * effect.parameter_errors[name]:.2g} {effect.parameter_units[name]}"
         for name, value in effect.parameters.items()
     ]
     return f"{said}, with {', '.join(parts)}" if parts else said
@@ -202,8 +231,7 @@ def _amount(effect: FittedEffect) -> str:
 def _few(entries: Sequence[ModelTerm]) -> str:
     """A few effects in words, and how many more there are."""
     shown = [effect_in_words(entry) for entry in (entries if len(entries) <= NAMED + 1 else entries[:NAMED])]
-    more = f" and {len(entries) - len(shown)} more" if len(entries) > len(shown) else ""
-    return ", ".join(shown) + more
+    return enumerated([*shown, *([f"{len(entries) - len(shown)} more"] if len(entries) > len(shown) else [])])
 
 
 def effect_in_words(entry: ModelTerm) -> str:

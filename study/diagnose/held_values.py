@@ -101,7 +101,8 @@ def saying_so(told: Diagnosis, wrong: Mapping[str, tuple[float, float]], compari
     """A diagnosis whose notes say which values were let go, and what was left with them."""
     held = {c.key: c for c in comparison.coefficients}
     each = [
-        f"{key} is {value:.4g} +- {error:.2g}{held[key].unit and f' {held[key].unit}'}, not {held[key].value:.4g}"
+        f"{key} is {value:.4g} +- {1.96 * error:.2g}{held[key].unit and f' {held[key].unit}'}, "
+        f"not {held[key].value:.4g}"
         for key, (value, error) in wrong.items()
     ]
     left = percent(comparison.prediction.error)

@@ -185,8 +185,8 @@ def further_sensors(rivals: Rivals, names: Sequence[str] = ()) -> tuple[Sensor, 
     every = (Sensor(c, m) for c in rivals.fits[0].model.coordinates for m in MOTIONS)
     found = {str(sensor): sensor for sensor in every if sensor not in known and not rivals.present.prescribed}
     for name in names:
-        there = ", ".join(repr(own) for own in found) or "none"
-        expect(name in found, f"{name!r} is no sensor beside those of the record; expected one of {there}")
+        there = "one of " + ", ".join(repr(own) for own in found) if found else "none for this record"
+        expect(name in found, f"{name!r} is no sensor beside those of the record; expected {there}")
     return tuple(found[name] for name in names or found)
 
 

@@ -26,7 +26,7 @@ from study.support.numbers import enumerated, percent
 def rival_in_words(row: Ranked, rows: Sequence[Ranked]) -> str:
     """What a rival has that not all of them have, in words."""
     own = [effect_in_words(e) for e in row.entries if not all(e.name in r.names for r in rows)]
-    return enumerated(own) if own else "none beside them"
+    return enumerated(own) if own else "nothing more"
 
 
 def next_test_in_words(found: NextTest) -> str:
@@ -76,8 +76,8 @@ def advice_in_words(found: NextTest | None) -> str:
     test = design_in_words(found.choice.design, found.rivals.present)
     needs = "" if found.choice.sensor is None else f", with {_sensor_in_words(found.choice.sensor)} measured"
     return (
-        f"The test that is most likely to decide between them {within}: {test}{needs}; 'study plan' rehearses it, says "
-        "how sure it is, and writes its force."
+        f"The test that is most likely to decide between them {within}: {test}{needs}; 'study plan', given such "
+        "limits, rehearses it, says how sure it is, and writes its force."
     )
 
 

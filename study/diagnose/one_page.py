@@ -12,7 +12,7 @@ from study.compare.comparison import Comparison
 from study.compare.fitted_coefficients import value_and_interval
 from study.diagnose.adding import added_candidate
 from study.diagnose.diagnosis_files import all_names, choices_in_words, diagnosis_in_words
-from study.diagnose.diagnosis_sentences import effect_in_words
+from study.diagnose.diagnosis_sentences import all_asked, effect_in_words
 from study.diagnose.verdict import Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
@@ -24,7 +24,7 @@ HEADLINES = {
     "missing_effect": "{effects} is missing from the equation",
     "missing_effects": "{effects} are missing from the equation",
     "partly_known": "{effects} missing from the equation, and something else that has no name",
-    "unknown_effect": "Something is missing from the equation that has no name yet",
+    "unknown_effect": "Something is missing from the equation that no candidate explains",
     "nothing_missing": "Nothing is missing from the equation that this record could show",
 }
 
@@ -106,7 +106,7 @@ def _in_brackets(formula: str) -> str:
 
 def _how_sure(diagnosis: Diagnosis) -> str:
     """What chance does, and what was asked for."""
-    asked = f"{diagnosis.asked} effects {'at places ' if diagnosis.comparison.model.named else ''}were tried."
+    asked = f"{all_asked(diagnosis)} were tried."
     if diagnosis.answer is None:
         return asked
     chance = max(diagnosis.answer.p_value, 1e-12)

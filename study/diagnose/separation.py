@@ -254,8 +254,8 @@ def allowed(
     least, own = shortest(present), own_limits(fits, present)
     expect(
         limits.length >= least,
-        f"the largest length of a test is {limits.length:g} s; expected {least:.3g} s or more, so that it can be "
-        "fitted and judged",
+        f"the largest length of a test (--max-length) is {limits.length:g} s; expected {least:.3g} s or more, so that "
+        "it can be fitted and judged",
     )
     most = replace(limits, length=min(length or limits.length, 8192 * present.source.dt))
     found = list(
@@ -266,7 +266,8 @@ def allowed(
     expect(
         found,
         f"the limits (force {limits.force:g}, displacement {limits.displacement:g}, length {limits.length:g} s) allow "
-        f"no test; expected larger ones: this record reached a force of {own.force:.3g} and a displacement of "
+        f"no test; expected larger --max-force, --max-displacement or --max-length: this record reached a force of "
+        f"{own.force:.3g} and a displacement of "
         f"{own.displacement:.3g} in {own.length:.3g} s",
     )
     return found

@@ -66,7 +66,7 @@ def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:
         base = search_base(diagnosis.comparison)
         try:
             with_term(base, free(term, connections(base.fit.model)[0]))
-            found[term.name] = "fitted, its free run does not stay finite on the part that is judged"
+            found[term.name] = "its free run does not stay finite on the part that is judged"
         except StudyError as error:
             found[term.name] = str(error)
     return found

@@ -317,4 +317,4 @@ def modes_table(modes: Modes, coordinates: Sequence[str]) -> str:
 
 
 def _with_error(value: float, error: float) -> str:
-    return f"{value:.4g}" + (f" +- {error:.1g}" if error > 0.0 else "")
+    return f"{value:.4g}" + (f" +- {1.96 * error:.1g}" if error > 0.0 else "")

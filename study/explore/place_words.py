@@ -107,7 +107,7 @@ def _modes(stage: Stage) -> str:
     if stage.comparison.model.prescribed:
         return ""
     before, after = stage.comparison.modes, stage.diagnosis.modes_after if stage.diagnosis is not None else None
-    sets = [("as fitted", before)] + ([("with the first candidate", after)] if after is not None else [])
+    sets = [("as fitted", before)] + ([("with what is missing", after)] if after is not None else [])
     heads = "".join(f"<th colspan=2>{title}</th>" for title, _ in sets)
     under = "".join("<th>natural frequency / Hz</th><th>damping ratio / %</th>" for _ in sets)
     names = stage.comparison.model.coordinates

@@ -12,6 +12,7 @@ from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.varying_coefficients import VaryingCoefficient, varying_in_words
 from study.diagnose.diagnosis_report import explained_share
+from study.diagnose.diagnosis_sentences import doubted
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, Diagnosis
@@ -213,7 +214,7 @@ def _detail(row: Ranked) -> str:
     elif 0.0 < row.distance < math.inf:
         said += f" That leaves more than the first by {number(row.distance, 2)} standard errors."
     who = "it" if len(effects) == 1 else "one of them"
-    return said + (f" As fitted {who} is not physical: {escape(row.unphysical)}." if row.unphysical else "")
+    return said + (f" {escape(doubted(who, row))}." if row.unphysical else "")
 
 
 def _label(row: Ranked) -> str:

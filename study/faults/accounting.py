@@ -44,8 +44,8 @@ from study.support.thresholds import TOLERANCE
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
 NOT_ASKED_OF_MODES = "faults of the measurement are not looked for beside 'linear: modal'"
 PUT_OFF = (
-    "a coefficient seems to change along the record, which looks like many a fault of the measurement: diagnose looks "
-    "for those beside the change"
+    "a coefficient seems to change along the record, as many faults of the measurement make it seem: 'study diagnose' "
+    "tries both"
 )
 NOT_ASKED = "faults of the measurement were not looked for: that takes a driven record in one piece, without --use"
 

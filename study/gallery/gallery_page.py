@@ -271,11 +271,16 @@ def left(found: RecordFindings) -> str:
             f"{size} (noise floor {floor}). The diagnosis still names {_effect(first)}{also} and with it "
             f"{percent(first['response_error'])} would be left; the climb ends here."
         )
-    depends = percent(last["left"]) if last.get("left") else "much"
+    depends = percent(unnamed(found)) if last.get("left") else "much"
     return (
         f"{size} (noise floor {floor}). General functions of the motion explain a part of it, {depends} of the "
         "response; no single candidate does."
     )
+
+
+def unnamed(found: RecordFindings) -> float:
+    """What depends on the motion and has no name, over the response; never more than is left in all."""
+    return min(float(found.last["left"]), float(found.steps[-1]["error"]["response"]))
 
 
 def candidates(found: RecordFindings) -> Block:
@@ -342,7 +347,7 @@ def climb_overview(shown: Sequence[Entry]) -> Block:
     rows = [
         (f"`{f.record}`", percent(f.steps[0]["error"]["response"]), _added(f),
          percent(f.steps[-1]["error"]["response"]), percent(f.steps[-1]["noise_floor"]["response"]),
-         percent(f.last["left"]) if f.last.get("left") and f.last["verdict"] not in (NOTHING, MISSING) else "",
+         percent(unnamed(f)) if f.last.get("left") and f.last["verdict"] not in (NOTHING, MISSING) else "",
          f.last["verdict"].replace("_", " "))
         for e in shown for f in e.found
     ]  # fmt: skip

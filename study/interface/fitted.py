@@ -47,8 +47,8 @@ class Number:
     unit: str = ""
 
     def __repr__(self) -> str:
-        """Value, standard error and unit."""
-        return f"{self.value:.5g} +- {self.error:.2g} {self.unit}".rstrip()
+        """Value, half of its 95 % interval as everything that is printed has it, and unit."""
+        return f"{self.value:.5g} +- {1.96 * self.error:.2g} {self.unit}".rstrip()
 
     def __float__(self) -> float:
         """The value."""

@@ -21,7 +21,7 @@ from study.support.numbers import LAST_DIGITS
 from study.support.units import parse_unit
 
 BASE = tuple(f"base_{motion}" for motion in MOTIONS)
-BASE_MOVES = "the base moves: its acceleration, the other way round, is the force"
+BASE_MOVES = "the base moves: its acceleration, sign reversed, is the force"
 PER_MASS = "all coefficients are per unit mass (give the inertia in the model for those of the structure)"
 
 

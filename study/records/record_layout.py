@@ -144,8 +144,8 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors, layout.horizon) for part in (fit, judge))
         notes.append(
-            f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon "
-            f"of {0.5 * (first + second):.3g} s, from {len(fit)} and {len(judge)} states of its own"
+            f"nothing in the model brings the mass back, so its motion drifts: it is fitted in {len(fit)} and judged "
+            f"in {len(judge)} pieces of {0.5 * (first + second):.3g} s, each from its own state"
         )
     prepared = strung_together(fit, judge, sensors, completed, notes)
     return replace(prepared, low=layout.cutoff or 0.0, every=every)

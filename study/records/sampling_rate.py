@@ -204,9 +204,7 @@ def low_passed(record: Record, highest: float) -> tuple[Record, str]:
     nyquist = 0.5 / record.dt
     factor = int(nyquist * PASSED / highest)
     most = 0.5 * nyquist * PASSED
-    expect(
-        factor > 1, f"{record.name}: what lies above {highest:g} Hz is to be left out; expected {most:.3g} Hz or less"
-    )
+    expect(factor > 1, f"{record.name}: --up-to is {highest:g} Hz; expected {most:.3g} Hz or less")
     said = (
         f"force and motion fade out from {highest:g} Hz to {2.0 * highest:g} Hz; a mode in between still shows, so "
         "choose at most half the frequency of the first mode to be left out"
@@ -278,6 +276,6 @@ def too_coarse(prepared: Prepared) -> str:
     middle = float(frequency[inside][np.searchsorted(total, 0.5 * total[-1])])
     return (
         f"the record {prepared.record.name} is sampled too coarsely: {1.0 / (middle * prepared.dt):.1f} times a period "
-        f"of its motion at {middle:.3g} Hz, or that comes from above {nyquist:.3g} Hz and only looks so; a fit means "
-        "little, as third harmonics fold onto the motion itself; expected four samples a period or more"
+        f"of its motion at {middle:.3g} Hz, or aliased from above {nyquist:.3g} Hz; a fit means little, "
+        " as third harmonics fold onto the motion itself; expected four samples a period or more"
     )

@@ -77,11 +77,17 @@ def reached(trials: pd.DataFrame, name: str, wanted: rates.Wanted | None = None)
 
 
 def _about(trials: pd.DataFrame, name: str) -> str:
-    failed = int(trials["trouble"].notna().sum())
+    failed = trials["trouble"].notna()
+    unmade = failed & trials["hidden"].isna() & (name == LIKE_RIGS)  # nothing could be hidden: they belong to no row
+    counted = int((failed & ~unmade).sum())
+    of_which = [f"{int(unmade.sum())} of which could not be made and are left out"] if unmade.any() else []
+    if counted or not of_which:
+        of_which.insert(0, f"{counted} of which could not be made or diagnosed and count as failed")
     first, last = int(trials["seed"].min()), int(trials["seed"].max())
+    each = " of each test" if trials["seed"].duplicated().any() else ""
     said = (
-        f"{len(trials)} trials (seeds {first} to {last}), {failed} of which could not be made or diagnosed and count "
-        "as failed; in brackets 95 % intervals (Wilson, 1927) and the number of trials."
+        f"{len(trials)} trials (seeds {first} to {last}{each}), {' and '.join(of_which)}; in brackets 95 % intervals "
+        "(Wilson, 1927) and the number of trials."
     )
     if name == BY_TEST:
         return f"{said} {WHAT_SHOWS}"
@@ -161,7 +167,7 @@ def likelihoods(trials: pd.DataFrame) -> list[Block]:
     better = sum(ratio < 0.0 for ratio in ratios)
     about = (
         f"In {len(ratios)} decays another effect came first and the hidden one was tied with it: two laws of damping. "
-        f"In {better} of them the wrong law fits the whole record better than the true one; at most the true one is "
-        f"{math.exp(0.5 * max(ratios, default=0.0)):.2g} times as likely. These records cannot tell more."
+        f"In {better} of them the wrong law fits the whole record better than the true one; the true one is at "
+        f"most {math.exp(0.5 * max(ratios, default=0.0)):.2g} times as likely. These records cannot tell more."
     )
     return [Text(about)]

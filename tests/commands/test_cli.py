@@ -183,7 +183,7 @@ def test_simulate_switches_where_a_formula_of_the_users_jumps() -> None:
 def test_simulate_says_where_no_number_of_steps_gives_the_motion(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["simulate", str(Path(DUFFING).parent / "dead_band.yaml"), "--samples", "4096", "--out", "chaotic.csv"]
     assert cli.main(words) == 0
-    assert "with twice as many as the 8 steps a sample a motion changes by" in capsys.readouterr().out
+    assert "with twice the 8 steps per sample, a motion changes by" in capsys.readouterr().out
 
 
 BAD = {

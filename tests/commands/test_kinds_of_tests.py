@@ -213,8 +213,8 @@ def test_an_axis_is_judged_over_a_horizon_and_never_called_chaotic():
     found = verdict("record.csv", "--model", "axis.yaml")
     assert found["candidates"][0]["term"] == "coulomb_friction"
     notes = compared("record.csv", "--model", "axis.yaml")["notes"]
-    assert any("over a horizon of" in note for note in notes)
+    assert any("each from its own state" in note for note in notes)
     shorter = compared("record.csv", "--model", "axis.yaml", "--horizon", "0.5")["notes"]
-    said = next(note for note in shorter if "over a horizon of" in note)
-    assert float(said.split("over a horizon of ")[1].split()[0]) == pytest.approx(0.5, rel=0.02)
+    said = next(note for note in shorter if "each from its own state" in note)
+    assert float(said.split("pieces of ")[1].split()[0]) == pytest.approx(0.5, rel=0.02)
     assert not any("chaotic" in note for note in notes)

@@ -40,7 +40,7 @@ def test_a_term_that_raises_the_error_is_added_only_where_that_is_asked_for(rig,
     before = model.read_bytes()
     assert cli.main(["add", "rig.yaml", "quintic_stiffness", *words]) == 0
     said = capsys.readouterr().out
-    assert "Quintic stiffness raises the error of what was not fitted, from" in said
+    assert "Quintic stiffness raises the held-out error, from" in said
     assert "rig.yaml is left as it was" in said
     assert model.read_bytes() == before
     assert not (rig / "found").exists()
@@ -225,4 +225,4 @@ def test_a_term_comes_back_where_it_brings_the_best_model_so_far():
 @pytest.mark.usefixtures("rig")
 def test_history_without_steps_says_so(capsys):
     assert cli.main(["history", "rig.yaml"]) == 0
-    assert "nothing was added yet" in capsys.readouterr().out
+    assert "no history yet" in capsys.readouterr().out

@@ -127,7 +127,7 @@ def test_a_record_in_millimetres_stays_in_millimetres(folder):
     (("--response", "acceleration"), "no acceleration was measured at a; expected --response displacement"),
     (("--free",), "nothing drives 'pair': its motion says nothing of m[a], m[b]; expected a value for each"),
     (("--group", "low"), "a group 'low' is asked for and this file has none"),
-    (("--column", "c.acceleration=2"), "--column names 'c.acceleration', which the model does not have"),
+    (("--column", "c.acceleration=2"), "--column, or 'columns' beside the file, names 'c.acceleration', which the model does not have"),
     (("--unit", "a.velocity=m/s"), "a unit is given for 'a.velocity'"),
     (("--fs", "10"), "its times step by 0.02 s"),
     (("--period", "7"), "the force 'shaker' 7 samples later differs"),
@@ -171,7 +171,7 @@ def test_blocks_in_turn_and_parts_are_what_is_asked_for(folder, capsys):
     compared(folder, "--judge", "every-other-block", out="turns")
     assert "every other block is judged" in capsys.readouterr().out
     compared(folder, "--fit", "100:900", out="parts")
-    assert "fitted to samples 100 to 900, judged on 900 to 2400" in capsys.readouterr().out
+    assert "fitted to samples 100:900, judged on 900:2400" in capsys.readouterr().out
 
 
 def test_an_oversampled_structure_is_thinned_unless_it_is_as_sampled(folder, tmp_path, capsys):

@@ -59,7 +59,7 @@ def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -
     assert all(c.error is not None and c.error < 0.01 * c.value for c in local.coefficients)
     assert local.prediction.error < 3.0 * local.prediction.floor, "judged in free run, like any other"
     assert comparison_document([local])["fit"]["estimator"] == "local_polynomial"
-    assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in comparison_summary([local])
+    assert "fitted to samples 0:4096 by local_polynomial, judged on 4096:8192" in comparison_summary([local])
 
 
 def test_the_error_of_the_force_is_without_leakage() -> None:

@@ -101,7 +101,7 @@ def test_a_model_that_misses_much_is_not_called_complete_where_nothing_is_found(
     record = trial.record.with_channels({"displacement": motion + 0.5 * np.std(motion) / np.std(another) * another})
     found = diagnosed(trial.believed, record)
     assert (found.verdict, found.answer, found.misses_much) == (UNKNOWN, None, True)
-    assert diagnosis_sentences(found)[0].startswith("No known effect is missing, but the model does not describe")
+    assert diagnosis_sentences(found)[0].startswith("The model does not describe this record, and no known effect")
 
     said = diagnosis_sentences(replace(of_drag, verdict=UNKNOWN, left=0.0))[0]
     assert of_drag.comparison.prediction.above_noise > 0.1

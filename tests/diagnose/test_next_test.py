@@ -201,7 +201,7 @@ def test_a_table_is_limited_in_its_acceleration_whatever_stands_on_it(rivals):
     ("force", "displacement", "length", "says"),
     [
         (1e-12, 1e-18, None, "allow no test"),
-        (None, None, 0.001, "the largest length of a test is 0.001 s"),
+        (None, None, 0.001, "the largest length of a test .--max-length. is 0.001 s"),
     ],
 )
 def test_limits_that_allow_nothing_are_one_sentence(rivals, force, displacement, length, says):

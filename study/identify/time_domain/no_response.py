@@ -59,8 +59,8 @@ def unfit(model: Model, prepared: Prepared) -> str:
         )
     if mass < SURE * error:
         return (
-            f"{name!r} shows no mass: its best linear system has m = {mass:.3g} +- {error:.2g}; expected a force that "
-            "reaches the resonance, or a model that gives the mass"
+            f"{name!r} shows no mass: its best linear system has m = {mass:.3g} +- {1.96 * error:.2g}; expected a "
+            "force that reaches the resonance, or a model that gives the mass"
         )
     return ""
 

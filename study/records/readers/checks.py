@@ -34,7 +34,8 @@ def not_finite(values: Floats, place: Callable[[int], str]) -> str | None:
         return None
     value = "no number" if np.isnan(values[bad[0]]) else "an infinite value"
     more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-    return f"has {value} in {place(int(bad[0]))}{more}; fill the gap, or cut it away by 'samples: [first, last]'"
+    first = place(int(bad[0]))
+    return f"has {value} in {first}{more}; fill the gap, or cut it away by 'samples: [first, last]' in its .record.yaml"
 
 
 def beyond(values: Floats, place: Callable[[int], str]) -> str | None:
@@ -83,7 +84,7 @@ def saturated(values: Floats) -> str | None:
         if count > CLIPPED_RATIO * usual and not _comes_to_rest(values, extreme):
             return (
                 f"rests at its {side} value {extreme:g} for {count} of {len(values)} samples, as a saturated channel "
-                "does; expected a wider measuring range (or 'accept_saturated: true' if the signal is like that)"
+                "does; expected a wider measuring range (or --accept-saturated, if the signal is like that)"
             )
     return None
 

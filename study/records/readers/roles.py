@@ -91,8 +91,9 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         channel = roles.said(role, column.role or _unit_role(column.unit)) or role
         known = roles.alone or channel in roles.kinds or channel.isidentifier()
         some = f"a force, time, a motion such as {_motion_of(roles)}, or a name for a further channel"
-        expect(known, f"{path}: --column names {role!r}, which the model does not have; expected {some}")
-        expect(channel not in named, f"{path}: --column names the {channel} twice; expected once")
+        asked = f"{path}: --column, or 'columns' beside the file, names"
+        expect(known, f"{asked} {role!r}, which the model does not have; expected {some}")
+        expect(channel not in named, f"{asked} the {channel} twice; expected once")
         named[channel] = column
     given = set(named)
     complete = all(f in named for f in roles.forces) and roles.motions(named) == list(roles.coordinates)
