@@ -127,7 +127,7 @@ def test_a_record_in_millimetres_stays_in_millimetres(folder):
     (("--response", "acceleration"), "no acceleration was measured at a; expected --response displacement"),
     (("--free",), "nothing drives 'pair': its motion says nothing of m[a], m[b]; expected a value for each"),
     (("--group", "low"), "a group 'low' is asked for and this file has none"),
-    (("--column", "c.acceleration=2"), "--column, or 'columns' beside the file, names 'c.acceleration', which the model does not have"),
+    (("--column", "c.acceleration=2"), "names 'c.acceleration', which the model does not have"),
     (("--unit", "a.velocity=m/s"), "a unit is given for 'a.velocity'"),
     (("--fs", "10"), "its times step by 0.02 s"),
     (("--period", "7"), "the force 'shaker' 7 samples later differs"),

@@ -447,5 +447,5 @@ def test_of_two_modes_the_one_that_is_meant_is_fitted():
     assert meant.error < 0.2 < single.fit(record, measurement=False).error
     with pytest.raises(st.StudyError, match="too little in common near 500 Hz"):
         single.fit(record, measurement=False, near=500.0)
-    with pytest.raises(st.StudyError, match="--up-to is [0-9.]+ Hz; expected 42"):
+    with pytest.raises(st.StudyError, match=r"--up-to is [0-9.]+ Hz; expected 42"):
         single.fit(record, measurement=False, up_to=100.0)

@@ -84,7 +84,8 @@ def saturated(values: Floats) -> str | None:
         if count > CLIPPED_RATIO * usual and not _comes_to_rest(values, extreme):
             return (
                 f"rests at its {side} value {extreme:g} for {count} of {len(values)} samples, as a saturated channel "
-                "does; expected a wider measuring range (or --accept-saturated, if the signal is like that)"
+                "does; expected a wider measuring range (or --accept-saturated, 'accept_saturated: true' beside "
+                "the file, if the signal is like that)"
             )
     return None
 
