@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,15 +20,17 @@ from study.diagnose.ranking import distance
 from study.diagnose.separation import rivals_of
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
+from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, custom
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.part_fit import fit_part
 from study.records import noise_floor
+from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record
 from study.records.record import Record
 from study.support import statistics
-from study.support.thresholds import K
+from study.support.thresholds import TOLERANCE, K
 
 DT = 0.02
 
@@ -310,3 +313,19 @@ def test_an_effect_that_explains_little_is_not_named_where_much_is_left(explaine
     """A periodic stiffness leaves what no shape of the motion sees: 32 % of the response beside a cogging of 6 %."""
     gain, prediction = SimpleNamespace(explained=explained), SimpleNamespace(above_noise=above_noise)
     assert verdict._explains(SimpleNamespace(gain=gain, prediction=prediction), left) is named
+
+
+def test_an_effect_too_small_to_matter_is_not_said_to_explain_nothing():
+    """The table had it first with 100.0 %, and the sentence below it said that no candidate explains any of it."""
+    duffing = read_model(Path(__file__).parents[2] / "models" / "duffing.yaml")
+    record = simulate(duffing, force(Excitation(level=4e-4), 4096, DT, 1), DT, Integrator("rk4", 8))
+    found = diagnosed(
+        duffing.without_term("cubic_stiffness"), record, without=all_but("cubic_stiffness", "coulomb_friction")
+    )
+    first = found.candidates[0]
+    assert (found.verdict, first.name) == (NOTHING, "cubic_stiffness")
+    assert found.comparison.prediction.error < TOLERANCE
+    said = diagnosis_sentences(found)[0]
+    assert said.startswith("Nothing is missing that matters at this level: ")
+    assert f"Cubic stiffness explains {100.0 * first.gain.explained:.1f} % of its mean square" in said
+    assert "looks like noise" not in said
