@@ -38,5 +38,14 @@ def certain(before: HeldOutPrediction, after: HeldOutPrediction, interval: tuple
 
     An effect that is certain but not credible is neither called missing nor, where it is in the model, needless.
     """
-    gained = math.sqrt(max(before.error**2 - after.error**2, 0.0))
-    return p_value < ALPHA and not interval[0] <= 0.0 <= interval[1] and gained > TOLERANCE
+    return not by_luck(interval, p_value) and gained(before, after) > TOLERANCE
+
+
+def by_luck(interval: tuple[float, float], p_value: float) -> bool:
+    """Whether chance gains as much as an effect, or its coefficient may be zero."""
+    return not p_value < ALPHA or interval[0] <= 0.0 <= interval[1]
+
+
+def gained(before: HeldOutPrediction, after: HeldOutPrediction) -> float:
+    """Rms of what a model with an effect explains of the residual of that without, over that of the response."""
+    return math.sqrt(max(before.error**2 - after.error**2, 0.0))

@@ -1,12 +1,12 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
-import math
 from collections.abc import Sequence
 
 from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import varying_in_words
 from study.diagnose import verdict
 from study.diagnose.constancy import wavers
+from study.diagnose.credibility import by_luck, gained
 from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import FittedEffect, Ranked
 from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
@@ -65,10 +65,8 @@ def _nothing(diagnosis: Diagnosis) -> str:
 
 def _matters_little(row: Ranked, prediction: Prediction) -> bool:
     """Whether an effect explains a part of the error by no chance, but one that is practically nothing."""
-    low, high = row.effect.interval
-    gained = math.sqrt(max(prediction.error**2 - row.response_error**2, 0.0))
-    sure = row.p_value < ALPHA and not low <= 0.0 <= high and row.gain.explained > DEPENDENCE
-    return sure and not row.unphysical and gained <= TOLERANCE
+    seen = row.gain.explained > DEPENDENCE and not (row.unphysical or by_luck(row.effect.interval, row.p_value))
+    return seen and gained(prediction, row.prediction) <= TOLERANCE
 
 
 def _misses_much(diagnosis: Diagnosis) -> str:
