@@ -161,7 +161,7 @@ def sheet(content: OnePage) -> Figure:
     below = (len(listed) + 12) * filled.size * filled.leading / 72.0  # the table, and room for notes
     draw(filled.panels(min(max(filled.at - filled.margin - below - 0.65, 1.3), 3.2)), content)
     filled.heading("Coefficients")
-    filled.rows([("", "term", "value", "95 % interval", "unit"), *listed], (0.0, 1.6, 3.4, 4.3, 6.1))
+    filled.rows([("", "term", "value", "95 % interval", "unit"), *listed], (0.0, 1.35, 3.05, 4.05, 6.15))
     filled.down(0.1)
     filled.text(_joined(content.notes), 7.0, colour="0.3", until=filled.margin)
     filled.figure.text(filled.margin / filled.width, 0.45 / filled.height, content.version, fontsize=7.0, color="0.3")
