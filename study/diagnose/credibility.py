@@ -38,7 +38,7 @@ def certain(before: HeldOutPrediction, after: HeldOutPrediction, interval: tuple
 
     An effect that is certain but not credible is neither called missing nor, where it is in the model, needless.
     """
-    return not by_luck(interval, p_value) and gained(before, after) > TOLERANCE
+    return not by_luck(interval, p_value) and explained_rms(before, after) > TOLERANCE
 
 
 def by_luck(interval: tuple[float, float], p_value: float) -> bool:
@@ -46,6 +46,6 @@ def by_luck(interval: tuple[float, float], p_value: float) -> bool:
     return not p_value < ALPHA or interval[0] <= 0.0 <= interval[1]
 
 
-def gained(before: HeldOutPrediction, after: HeldOutPrediction) -> float:
+def explained_rms(before: HeldOutPrediction, after: HeldOutPrediction) -> float:
     """Rms of what a model with an effect explains of the residual of that without, over that of the response."""
     return math.sqrt(max(before.error**2 - after.error**2, 0.0))

@@ -6,7 +6,7 @@ from study.compare.prediction import Prediction
 from study.compare.varying_coefficients import varying_in_words
 from study.diagnose import verdict
 from study.diagnose.constancy import wavers
-from study.diagnose.credibility import by_luck, gained
+from study.diagnose.credibility import by_luck, explained_rms
 from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import FittedEffect, Ranked
 from study.diagnose.verdict import NOTHING, PARTLY_KNOWN, Diagnosis
@@ -66,7 +66,7 @@ def _nothing(diagnosis: Diagnosis) -> str:
 def _matters_little(row: Ranked, prediction: Prediction) -> bool:
     """Whether an effect explains a part of the error by no chance, but one that is practically nothing."""
     seen = row.gain.explained > DEPENDENCE and not (row.unphysical or by_luck(row.effect.interval, row.p_value))
-    return seen and gained(prediction, row.prediction) <= TOLERANCE
+    return seen and explained_rms(prediction, row.prediction) <= TOLERANCE
 
 
 def _misses_much(diagnosis: Diagnosis) -> str:

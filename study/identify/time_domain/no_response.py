@@ -55,7 +55,8 @@ def unfit(model: Model, prepared: Prepared) -> str:
     if mass < -SURE * error and float(values[1]) < SURE * float(errors[1]):
         return (
             f"force and {response} of {name!r} seem to have opposite signs (a linear fit gives a mass of {mass:.3g}); "
-            "expected both positive in the same direction: --scale force=-1 turns the force round"
+            "expected both positive in the same direction: turn the force round (--scale force=-1, or without "
+            "that where it is given)"
         )
     if mass < SURE * error:
         return (
