@@ -1,6 +1,7 @@
 """Shape parameters that a model leaves open are found in the record; the estimators that rest on it."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.part_fit import fit_part
 from study.records.excitation import displacement_noise
+from study.records.prepared import whole
 from study.records.spectra import Segments
 from study.reproduction import tables
 from study.support.errors import StudyError
@@ -92,6 +94,17 @@ def test_a_chaotic_system_is_found_in_segments(seed, systems, records):
     assert fit.restarts
     for key, true in model.values.items():
         assert fit.model.values[key] == pytest.approx(true, rel=0.3)
+
+
+@pytest.mark.parametrize("name", ["duffing", "mathieu"])
+def test_without_noise_the_error_is_that_of_the_integration(name, systems, records):
+    """It is what a fit with twice the steps moves the coefficients by, beside which the residual's own is nothing."""
+    model, prepared = systems[name], whole(records[name])
+    held = [key for key in model.values if "." in key]
+    rough = fit_part(model, prepared, held, steps=4)
+    finer = fit_part(rough.model, prepared, held, steps=8, initial=np.atleast_2d(rough.initial))
+    told = in_free_run.with_step_error(replace(rough, covariance=0.0 * rough.covariance), prepared)
+    assert np.sqrt(np.diag(told.covariance)) == pytest.approx(np.abs(finer.values - rough.values), rel=0.01)
 
 
 def test_given_shapes_are_kept(systems, records):

@@ -18,15 +18,14 @@ from study.identify.frequency_domain.coefficients import Estimate, fitted_functi
 from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.fit_model import fit_model
-from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import CLEAN
+from study.identify.time_domain.part_fit import integration_shift, run_and_slopes
 from study.records import spectra
-from study.records.prepared import whole
+from study.records.prepared import Prepared, whole
 from study.records.record import ALONE, MOTIONS, Record, Sensor
-from study.support.errors import DivergenceError
 
 FITS_KEPT = 4  # those of the records that the threads are working on
-REFINED = 12  # free runs in which a fit follows a change of steps
 
 
 def output_error(model: Model, record: Record, settings: Settings) -> Identified:
@@ -100,24 +99,18 @@ def clean_motion(fit: FreeRunFit, record: Record) -> Record:
 def free_run_fit(model: Model, record: Record) -> FreeRunFit:
     """The fit in free run behind the estimate; cached, as several estimators use the same one."""
     opened = model.with_values({key: None for key in model.values if "." not in key})
-    return with_step_error(fit_model(opened, whole(record)), record, opened.held_keys)
+    prepared = whole(record)
+    return with_step_error(fit_model(opened, prepared), prepared)
 
 
-def with_step_error(fit: FreeRunFit, record: Record, held: Collection[str]) -> FreeRunFit:
+def with_step_error(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with the error of the integrator added to its covariance, where there is hardly any noise.
 
     Without noise the residual is the integrator's own error. That of a Runge-Kutta run falls to a sixteenth with
     halved steps, so halving them moves the estimates by fifteen sixteenths of their error. Continuity constraints
     are dropped for it, which can only add to the change.
     """
-    if fit.rms >= CLEAN * float(np.std(record["displacement"])):
+    if fit.rms >= CLEAN * prepared.spread:
         return fit
-    try:
-        finer = fit_free_run(
-            fit.model, record, held=held, steps_per_sample=2 * fit.steps_per_sample, restarts=fit.restarts,
-            initial=fit.initial, max_iterations=REFINED,
-        )  # fmt: skip
-    except DivergenceError:
-        return fit
-    moved = finer.values - fit.values
+    moved = integration_shift(fit, prepared, *run_and_slopes(fit, prepared))[: len(fit.keys)]
     return replace(fit, covariance=fit.covariance + np.outer(moved, moved))
