@@ -107,7 +107,10 @@ CASES = {
 }
 
 
-@pytest.fixture(scope="module", params=CASES)
+SLOW = ("early", "decay", "several")  # half a minute or more for two diagnoses
+
+
+@pytest.fixture(scope="module", params=[pytest.param(n, marks=pytest.mark.long if n in SLOW else ()) for n in CASES])
 def pair(request: pytest.FixtureRequest) -> Told:
     return CASES[request.param]()
 
