@@ -4,6 +4,10 @@ from pathlib import Path
 
 from snakemake import benchmark
 
+from study.support.cores import one_thread_of_algebra
+
+one_thread_of_algebra()  # two jobs at a time, each with fits side by side
+
 from study.reproduction.config import load_config
 from study.support.workflow_step import one_sentence, only_run, remove_half_written
 

@@ -10,6 +10,7 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from study.commands.parser import parser
+from study.support.cores import one_thread_of_algebra
 from study.support.errors import StudyError, expect
 from study.support.extras import lacked
 from study.support.terminal import harmless, shown_on
@@ -32,8 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         0; 2 for input or files that cannot be used; 130 when interrupted; 141 when the reader of the
         output went away; 1 for a fault in this program.
     """
-    # Fits run side by side, one on each core: threads within each would wait for each other. Read when NumPy is loaded.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    one_thread_of_algebra()
     try:
         with shown_on(sys.stdout) if sys.stdout else nullcontext():  # None where the shell has closed it
             _run(argv)

@@ -16,6 +16,11 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def one_thread_of_algebra() -> None:
+    """Keep NumPy, which is not to be loaded yet, from threads of its own: beside others they wait and take a core."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def side_by_side(
     function: Callable[[Item], Result], items: Sequence[Item], effort: Callable[[Item], float] | None = None,
     workers: int | None = None,

@@ -24,6 +24,7 @@ from study.identify.time_domain.continuation import NEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
+from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.no_response import (
     SURE,
     driven_at,
@@ -33,7 +34,15 @@ from study.identify.time_domain.no_response import (
     why_no_response,
 )
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, rough_steps
-from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
+from study.identify.time_domain.settling import (
+    KEPT,
+    MOST_FIT_STEPS,
+    better_fit,
+    continued,
+    from_segments,
+    in_segments,
+    settled,
+)
 from study.identify.time_domain.shape_search import Baseline, Start
 from study.identify.time_domain.shooting import own_begins
 from study.identify.time_domain.told_alone import (
@@ -103,6 +112,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     look = shape_search.searched_stretch(known, prepared) if short else prepared
     placed = model.named and prepared.response != FORCE
     fit = first_fit(known, look) if placed else _from_nothing(known, look)
+    if fit.restarts and not unknown:  # a chaotic system, settled in segments
+        return fit
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)
     in_order = tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms)
@@ -147,13 +158,24 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
-    """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term."""
-    fit, reason = None, None
+    """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term.
+
+    A chaotic system loses the motion in any single run, built up or not: it is fitted in segments at once.
+    """
+    fit, reason, starts = None, None, first_starts(model, prepared)
+    nonlinear = any(term.name not in LINEAR for term in model.terms)
+    first = _each_tried(model, prepared, starts, model.held_keys)
+    if nonlinear and first and not any(f.converged for f in first) and is_chaotic(first[0], prepared):
+        most = max(MOST_FIT_STEPS, first[0].steps_per_sample)  # it magnifies the integration's error as any other
+        begun = replace(first[0], model=model.with_values(starts[-1]), steps_per_sample=most)
+        apart = in_segments(begun, prepared, first[0])
+        if apart is not None and apart.converged and apart.restarts:
+            return apart
     try:
-        fit = best_fit(model, prepared, first_starts(model, prepared))
+        fit = _best_of(first, model, prepared, model.held_keys)
     except StudyError as error:
         reason = error
-    if (fit is None or not fit.converged) and any(term.name not in LINEAR for term in model.terms):
+    if (fit is None or not fit.converged) and nonlinear:
         fit = better_fit(fit, _built_up(model, prepared))
     if fit is None:
         raise reason or StudyError(why_no_response(model, prepared))
@@ -296,12 +318,22 @@ def best_fit(
         If there is no finite response from any start.
     """
     held = model.held_keys if held is None else tuple(held)
-    shapes = tuple(key for key in model.values if "." in key and key not in held)
-    begun = list(starts)
-    each = [_tried(model, prepared, (*held, *shapes), start, TRIED, initial) for start in begun]
-    nearer = [_halfway(begun[0], start) for start, fit in zip(begun[1:], each[1:], strict=True) if fit is None]
-    each += [_tried(model, prepared, (*held, *shapes), start, TRIED, initial) for start in nearer]
-    first = sorted((fit for fit in each if fit is not None), key=lambda fit: fit.rms)
+    return _best_of(_each_tried(model, prepared, list(starts), held, initial), model, prepared, held)
+
+
+def _each_tried(
+    model: Model, prepared: Prepared, starts: Sequence[Values], held: Sequence[str], initial: Floats | None = None
+) -> list[FreeRunFit]:  # fmt: skip
+    """Fits from several starts, open shape parameters held, that which leaves least first."""
+    kept = (*held, *(key for key in model.values if "." in key and key not in held))
+    each = [_tried(model, prepared, kept, start, TRIED, initial) for start in starts]
+    nearer = [_halfway(starts[0], start) for start, fit in zip(starts[1:], each[1:], strict=True) if fit is None]
+    each += [_tried(model, prepared, kept, start, TRIED, initial) for start in nearer]
+    return sorted((fit for fit in each if fit is not None), key=lambda fit: fit.rms)
+
+
+def _best_of(first: Sequence[FreeRunFit], model: Model, prepared: Prepared, held: Sequence[str]) -> FreeRunFit:
+    """The best of fits that tried their starts, brought to its minimum."""
     best = _at_minimum(first[0] if first else None, model, prepared, held)
     inside = next((fit for fit in first if fit.converged and not _unphysical(fit)), None)
     if best is not None and inside is not None and inside is not first[0] and _unphysical(best):

@@ -51,13 +51,13 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if prepared.response == FORCE or _stands(fit, prepared):
         return fit
     if not is_poor(fit, prepared.fitted) or is_chaotic(fit, prepared):  # what is not poor and does not stand is chaotic
-        apart = _in_segments(fit, prepared, fit)
+        apart = in_segments(fit, prepared, fit)
         return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
     best = better_fit(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
-    apart = _in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
+    apart = in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
     return apart if apart is not None and apart.converged and apart.rms <= best.rms else best
 
 
@@ -67,7 +67,7 @@ def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
     return apart.rms**2 < freedom * fit.rms**2
 
 
-def _in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeRunFit | None:
+def in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeRunFit | None:
     """Multiple shooting from where a fit stands, made one free run where that stands.
 
     None where it fails as well, or the best free run so far leaves no more than chance beside so many states.

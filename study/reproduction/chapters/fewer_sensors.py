@@ -10,6 +10,7 @@ are fitted in free run to what the sensors show and judged on the part of the re
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +32,11 @@ from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.record_layout import Layout
-from study.reproduction.chapters.chapter import Chapter, SensorSettings, Tables, judges
+from study.reproduction.chapters.chapter import Chapter, SensedStructure, SensorSettings, Tables, judges
 from study.reproduction.claims.judgement import Condition
 from study.reproduction.claims.reported import Reported
 from study.reproduction.settings import ClaimSettings
+from study.support.cores import side_by_side
 from study.support.document import Block, Text, table
 from study.support.errors import StudyError
 from study.support.numbers import percent
@@ -49,29 +51,38 @@ def make_sensors(_: ClaimSettings, own: SensorSettings, models: Path) -> Tables:
     ``error`` is the held-out error of the free run over the response's rms, all sensors together, ``floor`` what noise
     alone leaves; ``right`` are the effect and the connection that the structure has.
     """
-    tried: list[dict[str, Any]] = []
-    values: list[dict[str, Any]] = []
+    asked: list[tuple[dict[str, str], SensedStructure, Model, Record]] = []
     for structure, case in own.structures.items():
         truth = read_model(models / "structures" / f"{structure}.yaml")
         full = _motions(truth, own, case.level)
-        without = replace(truth, terms=tuple(t for t in truth.terms if t.term.name != case.hidden))
-        without = without.with_values(dict.fromkeys(k for k in without.values if "." not in k))  # shapes are known
         for sensors in case.sensors:
-            record, about = _seen(full, sensors.split(), own), {"structure": structure, "sensors": sensors}
-            opened = truth.with_values(dict.fromkeys(k for k in truth.values if "." not in k))
-            # The candidates differ in a term, which asks for no other layout.
-            opened, prepared = made_ready([record], opened, Layout())
-            for effect, place, model in _candidates(without, case.effects):
-                hidden = any(t.term.name == effect and t.place.path == place.path for t in truth.terms)
-                told = {**about, "effect": effect, "place": "-".join(place.ends), "right": hidden}
-                tried.append({**told, **_judged(model, prepared)})
-            fit = fit_model(opened, prepared)
-            values += [
-                {**about, "parameter": key, "true": truth.numbers()[key], "estimate": fit.estimate[key],
-                 "standard_error": fit.estimate.error(key), "note": "" if fit.converged else fit.message}
-                for key in fit.estimate.symbols
-            ]  # fmt: skip
-    return {"sensors": pd.DataFrame(tried), "sensor_values": pd.DataFrame(values)}
+            about = {"structure": structure, "sensors": sensors}
+            asked.append((about, case, truth, _seen(full, sensors.split(), own)))
+    tried, values = zip(*side_by_side(lambda one: _told(*one), asked), strict=True)
+    return {"sensors": pd.DataFrame(list(chain(*tried))), "sensor_values": pd.DataFrame(list(chain(*values)))}
+
+
+def _told(
+    about: dict[str, str], case: SensedStructure, truth: Model, record: Record
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:  # fmt: skip
+    """Every candidate by one set of sensors, and the values of the model that is right."""
+    without = replace(truth, terms=tuple(t for t in truth.terms if t.term.name != case.hidden))
+    without = without.with_values(dict.fromkeys(k for k in without.values if "." not in k))  # shapes are known
+    opened = truth.with_values(dict.fromkeys(k for k in truth.values if "." not in k))
+    # The candidates differ in a term, which asks for no other layout.
+    opened, prepared = made_ready([record], opened, Layout())
+    tried: list[dict[str, Any]] = []
+    for effect, place, model in _candidates(without, case.effects):
+        hidden = any(t.term.name == effect and t.place.path == place.path for t in truth.terms)
+        told = {**about, "effect": effect, "place": "-".join(place.ends), "right": hidden}
+        tried.append({**told, **_judged(model, prepared)})
+    fit = fit_model(opened, prepared)
+    values = [
+        {**about, "parameter": key, "true": truth.numbers()[key], "estimate": fit.estimate[key],
+         "standard_error": fit.estimate.error(key), "note": "" if fit.converged else fit.message}
+        for key in fit.estimate.symbols
+    ]  # fmt: skip
+    return tried, values
 
 
 def _motions(truth: Model, own: SensorSettings, level: float) -> Record:

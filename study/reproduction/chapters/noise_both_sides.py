@@ -49,6 +49,7 @@ from study.reproduction.claims.judgement import Condition, explained
 from study.reproduction.claims.reported import COEFFICIENTS, Reported
 from study.reproduction.ensemble import NOISE_OFFSET
 from study.reproduction.settings import ClaimSettings, RecordSettings
+from study.support.cores import side_by_side
 from study.support.document import Block, Text, table
 from study.support.numbers import percent
 
@@ -74,14 +75,22 @@ def make_noise(study: ClaimSettings, own: NoiseSettings, models: Path) -> Tables
     model = read_model(models / f"{own.system}.yaml")
     begun = replace(model, terms=tuple(entry.opened() for entry in model.terms))
     settings = Settings(study.segments.segments(), (study.fit_band[0], study.fit_band[1]), curves=False)
-    rows: list[dict[str, Any]] = []
-    for force, used in ((RANDOM, own.estimators), (PERIODIC_FORCE, own.periodic_estimators)):
-        for seed in range(own.first_seed, own.first_seed + own.seeds):
-            if force == PERIODIC_FORCE and seed >= own.first_seed + own.free_runs:
-                used = tuple(name for name in used if name not in ON_A_FREE_RUN)
-            for cell in _noisy_records(model, study, own, force, seed):
-                rows += [{"force": force, "seed": seed, **row} for row in _found(model, begun, cell, settings, used)]
-    table = _over_seeds(pd.DataFrame(rows), true_parameters(model.values))
+
+    def rows_of(asked: tuple[str, int]) -> list[dict[str, Any]]:
+        force, seed = asked
+        used = own.periodic_estimators if force == PERIODIC_FORCE else own.estimators
+        if force == PERIODIC_FORCE and seed >= own.first_seed + own.free_runs:
+            used = tuple(name for name in used if name not in ON_A_FREE_RUN)
+        cells = _noisy_records(model, study, own, force, seed)
+        return [
+            {"force": force, "seed": seed, **row}
+            for cell in cells
+            for row in _found(model, begun, cell, settings, used)
+        ]
+
+    seeds = range(own.first_seed, own.first_seed + own.seeds)
+    found = side_by_side(rows_of, list(product((RANDOM, PERIODIC_FORCE), seeds)))
+    table = _over_seeds(pd.DataFrame([row for rows in found for row in rows]), true_parameters(model.values))
     return {"noise": table, "noise_best": best_estimators(table, own)}
 
 
