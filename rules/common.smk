@@ -6,7 +6,7 @@ from study.support.workflow_step import rests_on
 # Scripts of steps that take less time than a start of Python with its packages, or little more.
 STEP_SCRIPTS = ("make_record", "identify", "monte_carlo", "draw", "claims", "excitation_reading", "integrator_steps", "structure_case", "join", "pages", "chapter", "part_two")
 if workflow.is_main_process and not workflow.dryrun:
-    step_server.preload(f"scripts/{script}.py" for script in STEP_SCRIPTS)
+    step_server.preload((f"scripts/{script}.py" for script in STEP_SCRIPTS), "study.figures.first_page")
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/cases.py: what only identification uses is not followed from there.

@@ -148,7 +148,8 @@ def write_each(kinds: Mapping[str, Callable[[], Figure]], outputs: Mapping[str, 
 def rendered(figure: Figure, kind: str) -> bytes:
     """A figure as the bytes of a file, the same bytes each time; ``kind`` is ``png``, ``svg`` or ``pdf``."""
     target = BytesIO()
-    figure.savefig(target, format=kind, metadata=METADATA[kind])
+    quickly = {"pil_kwargs": {"compress_level": 4}} if kind == "png" else {}  # of 6: a third of the time, 2 % larger
+    figure.savefig(target, format=kind, metadata=METADATA[kind], **quickly)
     return target.getvalue()
 
 

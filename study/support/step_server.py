@@ -19,9 +19,9 @@ from study.support.errors import StudyError
 FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
 
 
-def preload(scripts: Iterable[str]) -> None:
-    """Start the process that is forked: it loads what Snakemake and these scripts import while this one goes on."""
-    names = {"snakemake.cli", "snakemake.iocontainers", __name__}
+def preload(scripts: Iterable[str], *modules: str) -> None:
+    """Start the process that is forked: it loads what these scripts import, and modules, while this one goes on."""
+    names = {"snakemake.cli", "snakemake.iocontainers", __name__, *modules}
     for script in scripts:
         imports = (node for node in ast.parse(Path(script).read_text()).body if isinstance(node, ast.ImportFrom))
         names |= {name for i in imports for name in (i.module, *(f"{i.module}.{a.name}" for a in i.names)) if name}
