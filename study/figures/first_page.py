@@ -1,5 +1,8 @@
 """A page drawn on import: what Matplotlib loads for a first figure stays in a process from which others are forked."""
 
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
 from pathlib import Path
 
 from matplotlib import style

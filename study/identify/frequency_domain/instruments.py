@@ -163,7 +163,7 @@ def expected(item: Input, clean: Record, spread: dict[str, Floats]) -> Floats:
     """Mean of an input's history over Gaussian noise about a clean motion, shape (n,)."""
     used = [NOISY[name] for name in formulas.names(item.shape) if NOISY.get(name) in spread]
     if len(used) == 1:  # noise of several sources on one channel is as that of one
-        spread = {used[0]: np.linalg.norm(spread[used[0]], keepdims=True)}
+        spread = {used[0]: np.sqrt(np.sum(spread[used[0]] ** 2, keepdims=True))}
     sources = [s for s in range(len(spread)) if any(spread[name][s] != 0.0 for name in used)]
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     weights = weights / np.sum(weights)
