@@ -391,3 +391,12 @@ def test_fits_side_by_side_are_not_each_run_by_threads_of_their_own():
     for given, expected in ((free, "1"), (free | {"OPENBLAS_NUM_THREADS": "3"}, "3")):
         run = subprocess.run([sys.executable, "-c", asked], env=given, capture_output=True, text=True, check=True)
         assert run.stdout.splitlines()[-1] == expected
+
+
+def test_steps_of_the_workflow_are_not_run_by_threads_of_their_own_either():
+    """It asks before anything loads NumPy: Part I took a third longer, and Part II half as long again."""
+    begun = (Path(__file__).parents[2] / "Snakefile").read_text().partition("\none_thread_of_algebra()")
+    asked = "".join(begun[:2]) + "\nimport os; print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
+    free = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    run = subprocess.run([sys.executable, "-c", asked], env=free, capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["False", "1"]
