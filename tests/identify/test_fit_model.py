@@ -255,6 +255,6 @@ def test_segments_that_lead_astray_displace_no_better_free_run(monkeypatch):
     assert astray.rms > 1.5 * fit.rms
     monkeypatch.setattr(settling, "from_segments", lambda *_: astray)
     monkeypatch.setattr(settling, "is_chaotic", lambda f, _: f is astray)
-    monkeypatch.setattr(settling, "in_segments", lambda *_: replace(astray, converged=True))
+    monkeypatch.setattr(settling, "_in_segments", lambda *_: replace(astray, converged=True))
     again = settling.settled(fit, prepared)
     assert again.rms < 1.01 * fit.rms

@@ -24,7 +24,6 @@ from study.identify.time_domain.continuation import NEAR
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import modal_fit, with_modal_term
 from study.identify.time_domain.motion_start import from_the_motion
-from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.no_response import (
     SURE,
     driven_at,
@@ -36,11 +35,10 @@ from study.identify.time_domain.no_response import (
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, rough_steps
 from study.identify.time_domain.settling import (
     KEPT,
-    MOST_FIT_STEPS,
     better_fit,
     continued,
     from_segments,
-    in_segments,
+    of_chaos,
     settled,
 )
 from study.identify.time_domain.shape_search import Baseline, Start
@@ -165,11 +163,9 @@ def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
     fit, reason, starts = None, None, first_starts(model, prepared)
     nonlinear = any(term.name not in LINEAR for term in model.terms)
     first = _each_tried(model, prepared, starts, model.held_keys)
-    if nonlinear and first and not any(f.converged for f in first) and is_chaotic(first[0], prepared):
-        most = max(MOST_FIT_STEPS, first[0].steps_per_sample)  # it magnifies the integration's error as any other
-        begun = replace(first[0], model=model.with_values(starts[-1]), steps_per_sample=most)
-        apart = in_segments(begun, prepared, first[0])
-        if apart is not None and apart.converged and apart.restarts:
+    if nonlinear and first and not any(f.converged for f in first):
+        apart = of_chaos(first[0], prepared, starts[-1])
+        if apart is not None:
             return apart
     try:
         fit = _best_of(first, model, prepared, model.held_keys)

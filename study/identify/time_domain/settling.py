@@ -1,7 +1,7 @@
 """A fit brought to its minimum on the whole fitting part: enough steps, local minima, chaos."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from study.identify.time_domain.motion_start import from_the_motion, seen_everyw
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import SEARCH_STEPS, covariance_of, fit_part, integration_shift, run_and_slopes
 from study.identify.time_domain.shooting import slowest_rate
-from study.identify.time_domain.stretch_states import POOR, is_poor
+from study.identify.time_domain.stretch_states import POOR, is_poor, resembles_a_motion
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import DivergenceError, StudyError
 
@@ -51,14 +51,35 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if prepared.response == FORCE or _stands(fit, prepared):
         return fit
     if not is_poor(fit, prepared.fitted) or is_chaotic(fit, prepared):  # what is not poor and does not stand is chaotic
-        apart = in_segments(fit, prepared, fit)
+        apart = _in_segments(fit, prepared, fit)
         return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
     best = better_fit(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
-    apart = in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
+    apart = _in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
     return apart if apart is not None and apart.converged and apart.rms <= best.rms else best
+
+
+def of_chaos(fit: FreeRunFit, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit | None:
+    """The fit in segments of a chaotic system, from a start, where even with its values one run leaves a motion.
+
+    The many minima of single runs are worth no search then. None for a system that is not chaotic where a fit stands,
+    and where segments come to no end.
+    """
+    if not is_chaotic(fit, prepared):
+        return None
+    steps = max(MOST_FIT_STEPS, fit.steps_per_sample)  # chaos magnifies the integration's error as any other
+    try:
+        apart = fit_in_segments(
+            fit.model, prepared.record, start=start, held=fit.held, outputs=prepared.outputs, span=prepared.plan.fit,
+            steps_per_sample=steps,
+        )  # fmt: skip
+        first = np.atleast_2d(apart.initial)[:1]
+        once = fit_part(apart.model, prepared, fit.held, steps=steps, initial=first, max_iterations=0)
+    except DivergenceError:
+        return None
+    return apart if apart.restarts and apart.converged and resembles_a_motion(once, prepared.fitted) else None
 
 
 def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
@@ -67,7 +88,7 @@ def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
     return apart.rms**2 < freedom * fit.rms**2
 
 
-def in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeRunFit | None:
+def _in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeRunFit | None:
     """Multiple shooting from where a fit stands, made one free run where that stands.
 
     None where it fails as well, or the best free run so far leaves no more than chance beside so many states.
