@@ -62,12 +62,12 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 
 def of_chaos(fit: FreeRunFit, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit | None:
-    """The fit in segments of a chaotic system, from a start, where even with its values one run leaves a motion.
+    """The fit in segments of a chaotic system, from a start, where one run with the values of that leaves a motion.
 
-    The many minima of single runs are worth no search then. None for a system that is not chaotic where a fit stands,
-    and where segments come to no end.
+    The many minima of single runs are worth no search then. None for a system that is not chaotic where ``fit``, an
+    attempt at one run, stands, and where the search in segments does not converge.
     """
-    if not is_chaotic(fit, prepared):
+    if prepared.response == FORCE or not is_chaotic(fit, prepared):
         return None
     steps = max(MOST_FIT_STEPS, fit.steps_per_sample)  # chaos magnifies the integration's error as any other
     try:
