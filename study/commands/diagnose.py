@@ -1,6 +1,8 @@
 """``study diagnose``: which effect is missing from a model."""
 
 import argparse
+import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +35,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
         help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="do not try this effect")
+    parser.add_argument("--thorough", action="store_true", help="search to the end, instead of for about three minutes")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,20 +88,22 @@ def diagnosed_together(
     from study.compare.comparison import REPORTS
     from study.diagnose.confirmed_faults import diagnose_accounted
     from study.diagnose.user_candidates import check_on
+    from study.support import work
 
     name = ", ".join(record.name for record in records)
-    with progress("step", REPORTS, name) as step:
-        model, marked, separate = separated_records(arguments, model, records)
-        accounted = accounted_together(arguments, model, marked, path, progress=step)
-    with progress(" fits", name=name) as step:
-        check_on(accounted.comparison.record, own)
-        without = tuple(arguments.without)
-        found = diagnose_accounted(
-            accounted,
-            extra=own,
-            without=without,
-            progress=lambda done, of, what: step(f"{name}, {what}", max(of - done, 0)),
-        )  # a set is searched, and a corrected record diagnosed, with counts of their own
+    with work.limited_to(math.inf) if arguments.thorough else nullcontext():
+        with progress("step", REPORTS, name) as step:
+            model, marked, separate = separated_records(arguments, model, records)
+            accounted = accounted_together(arguments, model, marked, path, progress=step)
+        with progress(" fits", name=name) as step:
+            check_on(accounted.comparison.record, own)
+            without = tuple(arguments.without)
+            found = diagnose_accounted(
+                accounted,
+                extra=own,
+                without=without,
+                progress=lambda done, of, what: step(f"{name}, {what}", max(of - done, 0)),
+            )  # a set is searched, and a corrected record diagnosed, with counts of their own
     return found, separate
 
 

@@ -21,6 +21,7 @@ from study.identify.time_domain.shape_search import Baseline, Screened, Start, s
 from study.identify.time_domain.smoothness import with_all_knots
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
+from study.support import work
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.thresholds import PROMISING, TOLERANCE
@@ -130,9 +131,13 @@ def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | N
         begins = zip(entries, starts_of(entries, base), strict=True)
         return _fitted([Screened(entry, tuple(points)) for entry, points in begins], base, progress)
     ordered = screened(entries, base)
-    chosen = worth_fitting(ordered)
-    tried = _fitted(chosen, base, progress)
-    return _one_side([*tried, *_fitted(elsewhere(tried, ordered), base, progress, len(chosen))])
+    chosen, tried = worth_fitting(ordered), list[FittedCandidate]()
+    for first in range(0, len(chosen), MOST_PROMISING):
+        if not work.is_done():
+            tried += _fitted(chosen[first : first + MOST_PROMISING], base, progress, first)
+    if not work.is_done():
+        tried += _fitted(elsewhere(tried, ordered), base, progress, len(chosen))
+    return _one_side(tried)
 
 
 def screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:

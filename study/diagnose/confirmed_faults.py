@@ -11,7 +11,7 @@ from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import SPIKES, Fault
-from study.support import statistics
+from study.support import statistics, work
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
 
@@ -34,9 +34,18 @@ def diagnose_accounted(
     what is found, the record as it was given is asked for faults beside the model with it; where these are others, the
     record that is corrected for them is diagnosed, and the better of both diagnoses stands. Where nothing is found in
     a corrected record, what was corrected may have been the motion that is missing: then the record is diagnosed
-    without what the model alone told of its faults, and that stands where it leaves less. Arguments as for
-    :func:`study.diagnose.verdict.diagnose`.
+    without what the model alone told of its faults, and that stands where it leaves less. The first diagnosis stands
+    where all is done that may be. Arguments as for :func:`study.diagnose.verdict.diagnose`.
     """
+    most = work.most_for(len(accounted.given.record))
+    with work.limited_to(most - accounted.operations):
+        return _with_faults(accounted, extra, without, progress)
+
+
+def _with_faults(
+    accounted: Accounted, extra: Sequence[Term], without: Sequence[str], progress: Progress | None
+) -> Diagnosed:
+    """The same, counted."""
     made: list[Diagnosed] = []
 
     def found(one: Accounted) -> Diagnosed:
@@ -53,6 +62,8 @@ def diagnose_accounted(
         return made[-1]
 
     first = found(accounted)
+    if work.is_done():
+        return _cut_short(first)
     if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
         accounted = accounted.with_all_faults()
         first = found(accounted) if accounted.faults != first.accounted.faults else first
@@ -60,7 +71,7 @@ def diagnose_accounted(
     if freed is not None:
         first, accounted = freed, freed.accounted
     removable = any(f.corrected and not _plain(f) for f in accounted.faults)
-    if removable and first.diagnosis.verdict == UNKNOWN:
+    if removable and not work.is_done() and first.diagnosis.verdict == UNKNOWN:
         other = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
         instead, corrected = other.diagnosis.answer, first.diagnosis.comparison.prediction
         # what leaves no less than the correction by itself is the fault by another name
@@ -75,6 +86,8 @@ def diagnose_accounted(
     spiky = any(f.fault == SPIKES for f in faults)  # near the Nyquist frequency what is missing stands out as they do
     if first.diagnosis.left <= TOLERANCE and not (noisy or spiky or (beside and len(answer.entries) > 1)):
         return first
+    if work.is_done():
+        return _cut_short(first)
     for entry in answer.entries:
         model = model.with_term(entry)
     try:
@@ -88,6 +101,12 @@ def diagnose_accounted(
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
     return again if better else first
+
+
+def _cut_short(found: Diagnosed) -> Diagnosed:
+    """What was found, said to be the best so far."""
+    diagnosis = found.diagnosis
+    return replace(found, diagnosis=replace(diagnosis, ended=diagnosis.ended or work.ENDED))
 
 
 def _of_the_same(one: Accounted, other: Accounted) -> bool:

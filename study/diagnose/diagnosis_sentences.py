@@ -32,8 +32,8 @@ def diagnosis_sentences(diagnosis: Diagnosis, amounts: bool = True) -> list[str]
             said = _several(diagnosis, diagnosis.sets[0], amounts)
         case _:
             said = [_misses_much(diagnosis)] if diagnosis.misses_much else _unknown(diagnosis)
-    if diagnosis.ended_at is not None:
-        said.append(f"The search was ended by hand at sets of {diagnosis.ended_at}: what is said is the best so far.")
+    if diagnosis.ended:
+        said.append(f"The search was ended {diagnosis.ended}: what is said is the best so far.")
     if diagnosis.answer is not None:
         said += [varying_in_words(one) for one in diagnosis.varying]
     if diagnosis.comparison.prediction.diverged:

@@ -1,7 +1,6 @@
 """Candidates in order: by what they leave of samples that they were not fitted to, and which of them are a tie."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TypeVar
 
@@ -14,7 +13,7 @@ from study.diagnose.ranked import Ranked, ranked_candidate
 from study.identify.time_domain.weighted_fit import noise_left
 from study.support import statistics
 from study.support.arrays import Floats
-from study.support.cores import cores
+from study.support.cores import side_by_side
 from study.support.thresholds import ALPHA, NEARLY, K
 
 R = TypeVar("R", bound=Ranked)
@@ -31,11 +30,7 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
         return []
     before, asked = comparison.prediction, asked or len(candidates)
 
-    def row(candidate: FittedCandidate) -> Ranked:
-        return ranked_candidate(candidate, before)
-
-    with ThreadPoolExecutor(cores()) as pool:
-        rows = list(pool.map(row, candidates))
+    rows = list(side_by_side(lambda candidate: ranked_candidate(candidate, before), candidates))
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     outputs, fit = before.prepared.outputs, rows[0].fit
     noise = noise_left(fit.residual, len(fit.outputs))

@@ -63,9 +63,12 @@ def best_subsets(
     for size in range(1, max(sizes) + 1):
         grown = {tuple(sorted((*chosen, i))) for chosen in beam for i in range(len(names)) if i not in chosen}
         explained: dict[tuple[int, ...], float] = {}
-        for chosen in grown:
-            at = [column for i in chosen for column in own[i]]
-            explained[chosen] = float(product[at] @ np.linalg.solve(gram[np.ix_(at, at)], product[at]))
+        places = {chosen: [column for i in chosen for column in own[i]] for chosen in grown}
+        for width in {len(at) for at in places.values()}:  # sets with as many columns are solved together
+            alike = [chosen for chosen, at in places.items() if len(at) == width]
+            at = np.array([places[chosen] for chosen in alike])
+            solved = np.linalg.solve(gram[at[:, :, None], at[:, None, :]], product[at][:, :, None])[:, :, 0]
+            explained |= dict(zip(alike, np.sum(product[at] * solved, axis=1).tolist(), strict=True))
         beam = sorted(grown, key=lambda chosen: (-explained[chosen], chosen))[:BEAM]
         if size in sizes:
             found[size] = [frozenset(names[i] for i in chosen) for chosen in beam]

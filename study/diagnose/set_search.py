@@ -17,10 +17,11 @@ from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import TRIED, grown_states
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shape_search import Baseline, Start
-from study.support import statistics
+from study.support import statistics, work
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.thresholds import ALPHA
+from study.support.work import WorkDoneError
 
 MOST_EFFECTS = 4  # in a set
 EACH = 6  # sets of a size that are fitted from one beginning
@@ -34,7 +35,7 @@ class SetSearch:
     entries: dict[str, ModelTerm]  # the effects and their places
     offered: dict[str, ModelTerm]  # those that are worth a fit, with shape parameters at which each explains most
     tried: dict[frozenset[str], FittedCandidate] = field(default_factory=dict[frozenset[str], FittedCandidate])
-    ended_at: int | None = None  # effects in a set, at which the user ended the search
+    ended: str = ""  # why and where, if the search did not come to its end by itself
 
     def sets(self, size: int, *, simple: bool = False) -> list[FittedCandidate]:
         """Sets of so many effects, or simple ones, that were fitted; the best first, what is not physical last."""
@@ -44,6 +45,11 @@ class SetSearch:
     def asked(self, *, simple: bool) -> dict[str, ModelTerm]:
         """The effects that are offered, or the simple ones."""
         return {name: entry for name, entry in self.offered.items() if not simple or unknowns_of(entry) == 1}
+
+    def go_on(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
+        """Fit more sets, as long as the search may do more."""
+        work.go_on()
+        self.fit(starts, progress)
 
     def fit(self, starts: Iterable[SetStart], progress: Progress | None = None) -> None:
         """Fit sets; of a set that was fitted before the better fit stays."""
@@ -100,7 +106,8 @@ def searched(
     ``singles`` are the effects as fitted alone, ``settled`` those that were fitted on and may have left a side valley,
     ``asked`` all effects at places, those too beside which alone no motion stays finite. ``done`` says whether a set
     leaves nothing to be explained; ``fewer_than`` are the unknowns of an effect that explains nearly all alone: then
-    sets of simple effects with fewer are asked for. The user may end it (Ctrl-C): then what was fitted so far is there.
+    sets of simple effects with fewer are asked for. It ends when all is done that may be (:mod:`study.support.work`),
+    and the user may end it (Ctrl-C): then what was fitted so far is there.
     """
     offered = {c.name: next(t for t in c.fit.model.terms if t.name == c.name) for c in singles}
     if not base.several:  # damping that others leave nothing of lets a motion escape alone
@@ -116,8 +123,9 @@ def searched(
         if from_above and not (base.several or done(min(search.tried.values(), key=by_power))):
             _reduce(search, sizes, progress)
         _side_valleys(search, sizes)
-    except KeyboardInterrupt:  # what was found so far is there to be told
-        return replace(search, ended_at=max(map(len, search.tried), default=1))
+    except (KeyboardInterrupt, WorkDoneError) as end:  # what was found so far is there to be told
+        why = work.ENDED if isinstance(end, WorkDoneError) else "by hand"
+        return replace(search, ended=f"{why} at sets of {max(map(len, search.tried), default=1)}")
     return search
 
 
@@ -139,7 +147,7 @@ def _grow(
         for parent in _parents(search.sets(size - 1), simple=simple):
             offer_beside(search, parent, simple=simple)
             starts += set_screening.by_sensitivities(parent, search.asked(simple=simple), base, [size], EACH)[size]
-        search.fit(starts, progress)
+        search.go_on(starts, progress)
         _exchange(search, search.asked(simple=simple), size, simple, progress)
         larger = next(iter(search.sets(size, simple=simple)), None)
         gained = larger is not None and gains(best, larger, len(starts))
@@ -168,6 +176,7 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
     beside = [e for e in asked if e.name not in parent.names and (shaped or not e.term.parameters)]
     if not beside:
         return
+    work.go_on()
     found = candidates.screened(beside, shape_search.baseline(parent.fit, search.base.prepared))
     for item in candidates.worth_fitting(found) if search.base.several else found:
         entry = item.entry
@@ -178,7 +187,7 @@ def offer_beside(search: SetSearch, parent: FittedCandidate, *, simple: bool) ->
 def _side_valleys(search: SetSearch, sizes: Sequence[int]) -> None:
     """Fit the best sets without each of their effects: beside others an effect may leave a side valley."""
     for best, *others in filter(None, (search.sets(size)[:2] for size in sizes)):
-        search.fit([start_without(best, name) for name in best.names])
+        search.go_on([start_without(best, name) for name in best.names])
         for second in others:
             for name in second.names:
                 search.without(frozenset(second.names), name)
@@ -192,7 +201,7 @@ def _exchange(
     while parents := [p for p in _parents(search.sets(size), simple=simple) if frozenset(p.names) not in seen]:
         for parent in parents:
             exchanged = set_screening.by_sensitivities(parent, asked, search.base, [size], EACH)[size]
-            search.fit([start for start in exchanged if start.names not in search.tried], progress)
+            search.go_on([start for start in exchanged if start.names not in search.tried], progress)
         seen |= {frozenset(parent.names) for parent in parents}
 
 
@@ -214,7 +223,7 @@ def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) 
         asked = search.offered | {entry.name: entry for entry in every.fit.model.terms if entry.name in every.names}
         starts = set_screening.by_sensitivities(every, asked, search.base, sizes, EACH, moved=True)
         for size in sizes:
-            search.fit(starts[size], progress)
+            search.go_on(starts[size], progress)
     found = [(every.names, entry) for every in larger for entry in every.fit.model.terms]
     shaped = {entry.name: entry for names, entry in found if entry.name in names and unknowns_of(entry) > 1}
     for size in sizes:
@@ -223,6 +232,7 @@ def _reduce(search: SetSearch, sizes: Sequence[int], progress: Progress | None) 
 
 def _whole(search: SetSearch, beside: FittedCandidate) -> FittedCandidate | None:
     """All simple effects at once, begun at the best set of them; None where they have no finite motion."""
+    work.go_on()
     model, names = beside.fit.model, list(beside.names)
     for name, entry in search.offered.items():
         if unknowns_of(entry) == 1 and name not in names:
@@ -233,6 +243,7 @@ def _whole(search: SetSearch, beside: FittedCandidate) -> FittedCandidate | None
 
 def _with_shapes(search: SetSearch, whole: FittedCandidate) -> list[FittedCandidate]:
     """The sets with one flexible effect more, of those that promise most; the best two."""
+    work.go_on()
     base = shape_search.baseline(whole.fit, search.base.prepared)
     entries = [e for e in search.entries.values() if unknowns_of(e) > 1 and e.name not in whole.names]
     begun = zip(entries, shape_search.starts_of(entries, base), strict=True)

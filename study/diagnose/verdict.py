@@ -32,7 +32,7 @@ from study.identify.time_domain.promised_changes import PromisedChanges, promise
 from study.identify.time_domain.shape_search import Baseline
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
-from study.support import statistics
+from study.support import statistics, work
 from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, NEARLY, TOLERANCE, UNSTEADY, K
 
@@ -52,7 +52,7 @@ class Diagnosis:
     left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     sets: tuple[Ranked, ...]  # the answer, and all others that the record cannot tell from the best; empty without any
     families: tuple[FamilyGain, ...]  # what functions of displacement, ... explain of what has no name, best first
-    ended_at: int | None = None  # effects in a set, at which the user ended the search
+    ended: str = ""  # why and where a search did not come to its end by itself
 
     @property
     def answer(self) -> Ranked | None:
@@ -114,23 +114,32 @@ def diagnose(
     """Find the effects that a model lacks, and their places.
 
     What the comparison's model held is held, the rest is fitted. ``extra`` are the user's own candidates, ``without``
-    terms of the library to leave out; ``progress`` is called after each candidate that was fitted.
+    terms of the library to leave out; ``progress`` is called after each candidate that was fitted. Where all is done
+    that may be, what is not yet asked is not asked any more, and that is said.
     """
+    with work.limited_to(work.most_for(len(comparison.prepared.record))):
+        return _diagnosed(comparison, extra, without, progress)
+
+
+def _diagnosed(
+    comparison: Comparison, extra: Sequence[Term], without: Sequence[str], progress: Progress | None
+) -> Diagnosis:
+    """The same, counted."""
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
     own, elsewhere = comparison.fit.model.terms, 0
     tried = candidates.try_all(entries, base, progress)
     changes = promised_changes(comparison.fit, comparison.prepared, own)
-    if changes is not None and varying_candidates.first_of_all(tried, changes, comparison):
+    if changes is not None and not work.is_done() and varying_candidates.first_of_all(tried, changes, comparison):
         other = _changing(changes, comparison, base, tried, entries, progress)
         if other is not None and other.changes:
             return other  # else nothing that is named changes, and the record is judged as it was
         elsewhere = 0 if other is None else len(changes.shares)
     del changes  # and the record laid out anew: of a long one it takes as much as all that follows
     if (freed := _freed(comparison, base, tried)) is not None:
-        return diagnose(freed, extra=extra, without=without, progress=progress)
+        return _diagnosed(freed, extra, without, progress)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
-    more = _where_none_explains_it(found, base, tried, entries, progress)
+    more = [] if work.is_done() else _where_none_explains_it(found, base, tried, entries, progress)
     if more:
         tried = [*tried, *more]
         found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
@@ -138,12 +147,16 @@ def diagnose(
         return found
     if named[0].prediction.above_noise <= TOLERANCE:
         return found
+    if work.is_done():
+        return replace(found, ended=found.ended or f"{work.ENDED}, before changes were asked for")
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
     if changes is None or not varying_candidates.explains_more(changes, named[0].names, progress):
         return found
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
-    return found if other is None or not other.changes else other
+    if other is None or not other.changes:
+        return found if other is None else replace(found, ended=other.ended)
+    return other
 
 
 def _where_none_explains_it(
@@ -179,7 +192,7 @@ def _changing(
     diagnosed = partial(_diagnosis, suspect.comparison, base, every, both, progress, beside=beside)
     if beside:  # a change that is there gains when it is added: all effects at once are asked for where one does
         grown = diagnosed(from_above=False)
-        if not grown.changes or grown.ended_at is not None:
+        if not grown.changes or grown.ended:
             return grown
     return diagnosed()
 
@@ -210,7 +223,7 @@ def _diagnosis(
         decision.left,
         tuple(decision.sets),
         tuple(families),
-        decision.ended_at,
+        decision.ended,
     )
 
 
@@ -263,7 +276,7 @@ class _Decision:
     rows: list[Ranked]  # single effects in their final order
     left: float
     sets: list[Ranked]
-    ended_at: int | None = None  # effects in a set, at which the user ended the search
+    ended: str = ""  # why and where a search did not come to its end by itself
 
 
 def _decide(
@@ -307,13 +320,13 @@ def _decide(
         one = replace(one, verdict=MISSING)
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
-        return replace(one, ended_at=search.ended_at)
+        return replace(one, ended=search.ended)
     answer, left = _material(answer, sets, search, comparison)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
     if verdict == UNKNOWN and first is not None and (unusual or _stands_out(first, comparison.prepared)):
         first_alone = [first] + [r for r in rows if r is not first]
-        return replace(one, verdict=MISSING, rows=first_alone, ended_at=search.ended_at)
+        return replace(one, verdict=MISSING, rows=first_alone, ended=search.ended)
     core = _necessary(good, search, comparison, asked) if verdict == UNKNOWN else None
     if core is not None and believed(core, prediction, own) and not core.wanders(asked):
         verdict, answer, left = PARTLY_KNOWN, core, _left(core.fit, core.prediction)
@@ -322,7 +335,7 @@ def _decide(
         alone = len(answer.entries) == 1 and all(r.name != answer.name for r in rows)  # it was offered beside others
         rows = [answer, *rows] if alone else rows
         rows = sorted(rows, key=lambda r: answer.names.index(r.name) if r.name in answer.names else len(rows))
-    return _Decision(verdict, rows, left, good, search.ended_at)
+    return _Decision(verdict, rows, left, good, search.ended)
 
 
 def _smooth(decision: _Decision, comparison: Comparison, asked: int) -> _Decision:

@@ -20,6 +20,7 @@ from study.records.interpolation import between_runs, between_samples_kept, in_c
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
+from study.support import work
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError, expect
 from study.support.recent import Recent
@@ -153,7 +154,7 @@ class FreeRun:
         else:
             half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
             with ThreadPoolExecutor(1) as beside:
-                other = beside.submit(self._integrate, motion, bounds[half:], state[half:], out)
+                other = beside.submit(work.counted_here(self._integrate), motion, bounds[half:], state[half:], out)
                 self._integrate(motion, bounds[: half + 1], state[:half], out)
                 other.result()
         if self.places is not None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from study.equations.graph import Program
+from study.support import work
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError
 
@@ -29,7 +30,7 @@ NO_MEMORY = -2  # what a function returns that found none
 WRITTEN_OUT = 12  # columns up to which a step's loops are: more take twice as long
 ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and n(umbers)
     "evaluate": "aww a aw aw aw a",
-    "integrate": "w awwww a aww aw aaa anw aw aw aww w aw wa",
+    "integrate": "w awwww a aww aw aaa anw aw aw aww w aw waa",
 }
 
 
@@ -94,16 +95,18 @@ def integrate(
     fits = fits and bounds[-1] <= len(out) and len(drive) > 2 * steps * (min(int(bounds[-1]) + 1, len(out)) - 1)
     if not fits or any(not a.flags.carray for a in (states, out, starts, bounds)):  # the loops would write elsewhere
         raise ValueError("the arrays of a compiled loop do not fit each other; expected the shapes in its description")
-    registers = p.registers.copy()
-    return _checked(
+    registers, done = p.registers.copy(), np.zeros(1, dtype=np.int64)
+    failed = _checked(
         _function("integrate")(
             method, _at(p.code), len(p.code), motion.split, len(p.inputs), p.first, _at(registers),
             _at(motion.slots), *motion.slots.shape, _at(motion.sides), len(motion.sides), _at(motion.by_side),
             _at(motion.directions), _at(motion.shifts), _at(starts), dt, steps, _at(drive), drive.shape[1],
             _at(bounds), len(bounds), _at(states), motion.dofs, motion.states, out.shape[2],
-            _at(motion.observed), len(motion.observed), len(out), _at(out),
+            _at(motion.observed), len(motion.observed), len(out), _at(out), _at(done),
         )
     )  # fmt: skip
+    work.add(int(done[0]))
+    return failed
 
 
 def _at(array: Ints | Floats) -> int:

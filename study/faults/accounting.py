@@ -38,6 +38,7 @@ from study.identify.time_domain.stretch_states import is_poor
 from study.records.interpolation import BAND_LIMITED, WORDS
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
+from study.support import work
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
@@ -61,6 +62,7 @@ class Accounted:
     switched_off: tuple[str, ...]  # faults that are not looked for
     as_sampled: bool  # whether all samples are used
     put_off: bool = False  # whether faults that a change of a coefficient looks like are yet to be looked for
+    operations: int = 0  # that the search for them took
 
     @classmethod
     def as_compared(cls, comparison: Comparison) -> "Accounted":
@@ -147,11 +149,16 @@ def _accounted(
     model: Model, prepared: Prepared, known: Held, switched_off: Sequence[str], estimator: str,
     progress: Callable[[str], None] | None, as_sampled: bool, *, changes: bool,
 ) -> Accounted:  # fmt: skip
-    found = _corrected(model, prepared, known, switched_off, as_sampled, changes=changes)
-    ready = replace(found.prepared, notes=(*found.prepared.notes, PUT_OFF)) if found.put_off else found.prepared
-    comparison = _compared(model, ready, found.faults, found.fit, estimator, progress)
+    with work.limited_to(work.most_for(len(prepared.record))):
+        found = _corrected(model, prepared, known, switched_off, as_sampled, changes=changes)
+        ready = replace(found.prepared, notes=(*found.prepared.notes, PUT_OFF)) if found.put_off else found.prepared
+        comparison = _compared(model, ready, found.faults, found.fit, estimator, progress)
+        if work.is_done():
+            said = f"the search for faults of the measurement was ended {work.ENDED}"
+            comparison = replace(comparison, notes=(*comparison.notes, said))
+        operations = work.done()
     off = tuple(switched_off)
-    return Accounted(comparison, found.faults, found.given, known, off, as_sampled, found.put_off)
+    return Accounted(comparison, found.faults, found.given, known, off, as_sampled, found.put_off, operations)
 
 
 def _corrected(
@@ -199,9 +206,9 @@ def _corrected(
         if put_off:
             told = tuple(one for one in told if one[0] in UNLIKE_PHYSICS)
         end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
-        if not put_off:
+        if not (put_off or work.is_done()):
             end = _beneath_too(model, prepared, fit, faults, asked, end)
-        if not put_off and DELAY not in [fault.fault for fault in end.faults]:
+        if not (put_off or work.is_done()) and DELAY not in [fault.fault for fault in end.faults]:
             late = _late_response(model, prepared, fit, faults, asked, needed)
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)

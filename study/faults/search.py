@@ -53,6 +53,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
+from study.support import work
 from study.support.errors import DivergenceError, expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -219,7 +220,7 @@ def _searched(
         again = left_again(left, corrected(given, wider))
         stage = stage if again is None else SearchStage(given, wider, again, again)
     for _ in range(ROUNDS):
-        following = _next(stage, asked)
+        following = None if work.is_done() else _next(stage, asked)
         if following is None:
             break
         stage = following

@@ -240,7 +240,7 @@ class Fit(FitPictures):
         return simulate(self.model, force, initial=initial, name=f"{self.model.name}_predicted")
 
     def diagnose(
-        self, candidates: Mapping[str, str] | None = None, without: Sequence[str] = ()
+        self, candidates: Mapping[str, str] | None = None, without: Sequence[str] = (), *, thorough: bool = False
     ) -> "Diagnosis":  # fmt: skip
         """Which effect is missing: every effect of the library is tried, and formulas of your own.
 
@@ -250,6 +250,8 @@ class Fit(FitPictures):
             Name to formula: ``{"bushing": "u*abs(u)"}``.
         without : sequence of str
             Effects of the library to leave out.
+        thorough : bool
+            Whether to search to the end, instead of for about three minutes.
 
         Raises
         ------
@@ -258,7 +260,7 @@ class Fit(FitPictures):
         """
         from study.interface.found import diagnosed
 
-        return diagnosed(self, candidates or {}, without)
+        return diagnosed(self, candidates or {}, without, thorough=thorough)
 
     def add(
         self, added: "Candidate | str | ModelTerm | None", *, at: str | None = None,

@@ -3,7 +3,9 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -17,6 +19,7 @@ from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
 from study.interface.showing import LEGEND_ABOVE, TABLES, Words, drawing_axes, html_table
+from study.support import work
 from study.support.errors import expect
 from study.support.extras import needed
 from study.support.numbers import percent
@@ -232,7 +235,7 @@ class Diagnosis:
         return html_table(f"Verdict: {self.verdict.replace('_', ' ')}", heads, rows, self.says)
 
 
-def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagnosis:
+def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str], *, thorough: bool) -> Diagnosis:
     """What :meth:`Fit.diagnose` does; its arguments."""
     by = fit.comparison.estimator
     expect(by == FREE_RUN, f"candidates are fitted in free run; expected a fit by {FREE_RUN}, this one is by {by}")
@@ -241,7 +244,8 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
     extra = own_candidates([f"{name}={formula}" for name, formula in own.items()], fit.comparison.model)
     check_on(fit.comparison.record, extra)
     asked = replace(fit.asked, comparison=fit.comparison)
-    found = confirmed_faults.diagnose_accounted(asked, extra=extra, without=tuple(without))
+    with work.limited_to(math.inf) if thorough else nullcontext():
+        found = confirmed_faults.diagnose_accounted(asked, extra=extra, without=tuple(without))
     untried = unfitted(found.diagnosis, extra)
     says = [diagnosis_in_words(found.diagnosis), *unfitted_in_words(untried)]
     return Diagnosis(found.diagnosis, found.faults, Words(" ".join(says)), untried)

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from study.support import work
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -33,7 +35,8 @@ def side_by_side(
     """
     hardest_first = sorted(range(len(items)), key=lambda i: -effort(items[i]) if effort else 0.0)
     with ThreadPoolExecutor(workers or cores()) as pool:
-        begun = {i: pool.submit(function, items[i]) for i in hardest_first}
+        counted = work.counted_here(function)
+        begun = {i: pool.submit(counted, items[i]) for i in hardest_first}
         try:
             for i in range(len(items)):
                 yield begun.pop(i).result()  # which nobody holds any longer

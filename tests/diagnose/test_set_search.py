@@ -15,6 +15,7 @@ from study.diagnose.set_search import SetSearch, gains, searched
 from study.equations.model import ModelTerm
 from study.equations.place import Place
 from study.identify.time_domain import shape_search
+from study.support import work
 from study.support.arrays import Floats
 
 N = 4800
@@ -172,11 +173,30 @@ def test_what_the_user_ends_leaves_the_best_so_far(monkeypatch: pytest.MonkeyPat
             raise KeyboardInterrupt
 
     search = Bench(monkeypatch, hidden("abd")).search(progress=progress)
-    assert search.ended_at == 3
+    assert search.ended == "by hand at sets of 3"
     assert search.sets(2)
     assert told[-1] == "sets of 3"
     assert "sets of 2" in told
-    assert Bench(monkeypatch, hidden("abd")).search().ended_at is None
+    assert not Bench(monkeypatch, hidden("abd")).search().ended
+
+
+def test_a_search_that_has_done_its_work_leaves_the_best_so_far(monkeypatch: pytest.MonkeyPatch):
+    """Each fit counts as one operation here; a batch that has begun is made to its end."""
+    bench = Bench(monkeypatch, hidden("abd"))
+    bench.search()
+    whole, bench.fitted = len(bench.fitted), []
+    fit = bench.fit
+
+    def counted(start: SetStart) -> Any:
+        work.add(1)
+        return fit(start)
+
+    monkeypatch.setattr(bench, "fit", counted)
+    with work.limited_to(8):
+        search = bench.search()
+    assert 8 <= len(bench.fitted) < whole
+    assert search.ended == f"{work.ENDED} at sets of {max(map(len, search.tried))}"
+    assert search.sets(2)
 
 
 def test_exchanges_go_on_until_none_gains(monkeypatch: pytest.MonkeyPatch):

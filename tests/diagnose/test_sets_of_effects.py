@@ -1,11 +1,13 @@
 """A diagnosis that names a set of effects, and what it says of the others that the record cannot tell from it."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from study import cli
 from study.diagnose import verdict
 from study.diagnose.adding import added_candidate
 from study.diagnose.confirmed_faults import Diagnosed, diagnose_accounted
@@ -13,9 +15,11 @@ from study.diagnose.diagnosis_report import diagnosis_fields, set_table
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.verdict import MISSING, NOTHING, PARTLY_KNOWN, SEVERAL, UNKNOWN, Diagnosis
 from study.equations.terms import LIBRARY
+from study.support import work
 from study.trials.draw import Trial, make_trial
 from study.trials.findings import compared
 from study.trials.runs import rig_orders
+from study.trials.sealed import write_trial
 from study.way_in.compare_records import compare_records
 
 HIDDEN = ("quadratic_stiffness", "coulomb_friction", "cubic_damping")
@@ -185,3 +189,25 @@ def test_a_set_that_is_added_leaves_what_was_promised(of_three: Diagnosed):
 def test_a_table_of_sets_is_for_sets_alone(of_three: Diagnosed):
     diagnosis = of_three.diagnosis
     assert set_table(replace(diagnosis, verdict=MISSING, sets=diagnosis.candidates[:1])) == ""
+
+
+@pytest.mark.long
+def test_a_search_ends_after_its_work_and_says_so_unless_it_is_thorough(
+    rig: Trial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """What was fitted by then is told; the limit is as low as can be here."""
+    record, model, _ = write_trial(rig, tmp_path)
+    words = ["diagnose", str(record), "--model", str(model), "--out", str(tmp_path / "found")]
+    words += [word for name in LIBRARY if name not in HIDDEN for word in ("--without", name)]
+    monkeypatch.setattr(work, "MOST", (1, 0))
+    assert cli.main(words) == 0
+    assert f"The search was ended {work.ENDED} at sets of 1: what is said is the best so far." in spoken(capsys)
+    assert cli.main([*words, "--thorough"]) == 0
+    told = spoken(capsys)
+    assert "was ended" not in told
+    assert "Quadratic stiffness" in told
+
+
+def spoken(capsys: pytest.CaptureFixture[str]) -> str:
+    """What was printed, in one line."""
+    return " ".join(capsys.readouterr().out.split())

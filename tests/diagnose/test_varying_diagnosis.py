@@ -79,19 +79,19 @@ def test_in_one_decay_nothing_changes_with_time_as_its_amplitude_falls_with_it(m
 
 
 @pytest.mark.parametrize(
-    ("beside", "changes", "ended_at", "asked"),
-    [(True, False, None, [False]), (True, True, None, [False, True]), (True, True, 2, [False]),
-     (False, True, None, [True])],
+    ("beside", "changes", "ended", "asked"),
+    [(True, False, "", [False]), (True, True, "", [False, True]), (True, True, "by hand", [False]),
+     (False, True, "", [True])],
 )  # fmt: skip
 def test_beside_what_is_named_a_change_has_to_gain_before_all_effects_are_asked_for_at_once(
-    monkeypatch: pytest.MonkeyPatch, beside: bool, changes: bool, ended_at: int | None, asked: list[bool]
+    monkeypatch: pytest.MonkeyPatch, beside: bool, changes: bool, ended: str, asked: list[bool]
 ):
     """Nor are they where the user has ended the search; nothing is fitted here."""
     made: list[bool] = []
 
     def diagnosis(*_: Any, from_above: bool = True, **__: Any) -> Any:
         made.append(from_above)
-        return SimpleNamespace(changes=changes, ended_at=ended_at)
+        return SimpleNamespace(changes=changes, ended=ended)
 
     comparison: Any = SimpleNamespace()
     seen = SimpleNamespace(comparison=comparison, entries=[])

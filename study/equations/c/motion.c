@@ -138,6 +138,7 @@ static inline void stage_of(
 
 static inline void step_of(Motion *m, double time, double h, const double *drive, int64_t width, int64_t count) {
     double half = h * 0.5, third = h / 3.0, sixth = h / 6.0;
+    m->done += 4 * (m->length + m->states * count);
     if (!m->ran)
         for (int64_t i = 0; i < m->states; i++) *register_of(m, i) = m->state[i * width];
     for (int64_t i = 0; i < m->states; i++)
@@ -376,7 +377,7 @@ int prepare_motion(
  * become those where it ends. A motion runs on to the first sample of the next, which overwrites it; the last one does
  * not write that sample, which another thread may own. `drive` has 2 `steps` rows a sample. `out`, shape (samples,
  * observations, columns), gets the rows that are `observed`: of the states, then of the program. Instructions from
- * `split` on are those of observations alone.
+ * `split` on are those of observations alone. `done` grows by what the steps took: instructions, and numbers of states.
  */
 EXPORT int64_t integrate(
     int64_t method, const int64_t *code, int64_t count, int64_t split, int64_t inputs, int64_t first, double *r,
@@ -384,10 +385,10 @@ EXPORT int64_t integrate(
     const int64_t *by_side, const double *directions, const int64_t *shifts, const double *starts, double dt,
     int64_t steps, const double *drive, int64_t drives, const int64_t *bounds, int64_t bound_count, double *states,
     int64_t dofs, int64_t state_count, int64_t columns, const int64_t *observed, int64_t observed_count,
-    int64_t samples, double *out
+    int64_t samples, double *out, int64_t *done
 ) {
     Motion m = {.dofs = dofs, .states = state_count, .columns = columns, .drives = drives, .rows = rows,
-                .onto = method != SUMMED};
+                .length = count, .onto = method != SUMMED};
     m.friction = (Friction){.places = places, .sides = sides, .by_side = by_side, .directions = directions,
                             .shifts = shifts};
     int64_t failed = NO_MEMORY, runs = bound_count - 1, of_sample = observed_count * columns;
@@ -413,6 +414,7 @@ EXPORT int64_t integrate(
         if (failed == ALL_FINITE && shared)
             memcpy(out + begin * of_sample, last, (size_t)((bounds[runs] - begin) * of_sample) * sizeof(double));
     }
+    *done += m.done;
     set_rounding(before);
     free(last);
     forget_motion(&m);

@@ -49,6 +49,7 @@ typedef struct {
     double *total;                              /* one row */
     int64_t onto;                               /* stages are added to the state one by one; else their sum is */
     int64_t ran;                                /* the program has run at this state and time */
+    int64_t length, done;                       /* instructions of the program, and operations of all steps so far */
     Friction friction;
 } Motion;
 
