@@ -37,8 +37,7 @@ def diagnose_accounted(
     without what the model alone told of its faults, and that stands where it leaves less. The first diagnosis stands
     where all is done that may be. Arguments as for :func:`study.diagnose.verdict.diagnose`.
     """
-    most = work.most_for(len(accounted.given.record))
-    with work.limited_to(most - accounted.operations):
+    with work.limited_to(accounted.work_left):
         return _with_faults(accounted, extra, without, progress)
 
 

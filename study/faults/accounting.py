@@ -64,6 +64,11 @@ class Accounted:
     put_off: bool = False  # whether faults that a change of a coefficient looks like are yet to be looked for
     operations: int = 0  # that the search for them took
 
+    @property
+    def work_left(self) -> float:
+        """Operations that a diagnosis of it may take."""
+        return work.most_for(len(self.given.record)) - self.operations
+
     @classmethod
     def as_compared(cls, comparison: Comparison) -> "Accounted":
         """A comparison with a record that is taken as it is: no faults are looked for."""

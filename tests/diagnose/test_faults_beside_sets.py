@@ -12,6 +12,7 @@ from study.diagnose import confirmed_faults
 from study.diagnose.confirmed_faults import diagnose_accounted, same
 from study.diagnose.verdict import SEVERAL, UNKNOWN
 from study.faults.fault import Fault
+from study.support import work
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
@@ -87,7 +88,7 @@ class Corrected:
         self.comparison = Compared(tuple(f"corrected for {fault.fault}" for fault in faults))
         self.asked: list[tuple[str, ...]] = []
         self.otherwise: list[tuple[Fault, ...]] = []  # for what it was corrected in its place
-        self.put_off = False
+        self.put_off, self.work_left = False, np.inf
 
     def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
         self.asked.append(model.names)
@@ -109,6 +110,7 @@ class Found:
     verdict: str
     changes: bool
     comparison: Compared
+    ended: str = ""
 
 
 def diagnosed(
@@ -147,6 +149,15 @@ def test_a_record_is_corrected_anew_where_it_shows_other_faults_beside_the_set(m
     assert record.asked == [("inertia", *SET)]
     assert found.accounted.faults == found.faults == (late,)
     assert found.diagnosis.answer.response_error == 0.02
+
+
+def test_where_all_work_is_done_the_first_diagnosis_stands_and_says_so(monkeypatch: pytest.MonkeyPatch):
+    record = Corrected([OFFSET], beside=[delay(1.0)])
+    record.work_left = 0.0
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05))
+    assert made == 1
+    assert record.asked == []
+    assert found.diagnosis.ended == work.ENDED
 
 
 @pytest.mark.parametrize("again", [(SET, 0.0, 0.06), ((), 0.0, 0.0)])
