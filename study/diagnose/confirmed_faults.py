@@ -78,7 +78,7 @@ def _with_faults(
             first = other
     answer, faults = first.diagnosis.answer, first.accounted.faults
     if answer is None:
-        return first
+        return _cut_short(first) if work.is_done() else first
     model = accounted.comparison.model
     beside = len(faults) > 0 or first.accounted is not accounted
     noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
