@@ -198,7 +198,7 @@ def respond(
     shown, derivatives = run.respond(values, design.begin[: run.moving], run.moving if differentiate else 0)
     far = 1e100  # what overflows when it is squared is as good as endless
     if not (np.all(np.abs(shown) < far) and np.all(np.abs(derivatives) < far)):
-        raise DivergenceError("the free run leaves the range of numbers", run.time(0))
+        raise DivergenceError("the free run leaves the range of numbers", run.start)
     return shown, derivatives
 
 

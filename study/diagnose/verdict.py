@@ -190,11 +190,13 @@ def _changing(
     changes = varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
     every, both = [*others, *changes], [*entries, *suspect.entries]
     diagnosed = partial(_diagnosis, suspect.comparison, base, every, both, progress, beside=beside)
-    if beside:  # a change that is there gains when it is added: all effects at once are asked for where one does
-        grown = diagnosed(from_above=False)
-        if not grown.changes or grown.ended:
-            return grown
-    return diagnosed()
+    if not beside:
+        return diagnosed()
+    grown = diagnosed(from_above=False)  # a change that is there gains when it is added: only then all effects at once
+    if not grown.changes or grown.ended:
+        return grown
+    whole = diagnosed()
+    return replace(grown, ended=whole.ended) if whole.ended else whole
 
 
 def _diagnosis(

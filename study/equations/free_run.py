@@ -5,7 +5,6 @@ to the variational equations gives exactly the derivative of the Runge-Kutta map
 of the numbers which the simulation yields, not of an idealisation of them.
 """
 
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -61,10 +60,11 @@ class FreeRun:
         """Time of the first sample in seconds."""
         return self.starts[0][1]
 
-    def time(self, sample: int) -> float:
-        """Time of a sample along the motions in seconds."""
-        begin, start = self.starts[bisect_right(self.starts, sample, key=lambda s: s[0]) - 1]
-        return start + (sample - begin) * self.dt
+    def times(self, samples: Ints) -> Floats:
+        """Times of samples along the motions in seconds, shape (samples,)."""
+        begins, starts = np.array([s[0] for s in self.starts]), np.array([s[1] for s in self.starts])
+        of = np.searchsorted(begins, samples, side="right") - 1
+        return starts[of] + (samples - begins[of]) * self.dt
 
     @property
     def length(self) -> int:
@@ -176,11 +176,11 @@ class FreeRun:
     def _integrate(self, motion: MotionProgram, cuts: Sequence[int], states: Floats, out: Floats) -> None:
         """What is observed, and derivatives, into ``out``; ``states`` become those at which the next segments begin."""
         bounds = np.array(self.along(cuts), dtype=np.int64)
-        starts = np.array([self.time(begin) for begin in bounds[:-1]])
+        starts = self.times(bounds[:-1])
         method = kernels.Method.SUMMED if motion.dofs else kernels.Method.ONE_BY_ONE  # as before, to the last bit
         failed = kernels.integrate(motion, starts, self.dt, self.steps, self.drive, bounds, states, out, method)
         if failed >= 0:
-            time = self.time(failed)
+            time = float(self.times(np.array([failed]))[0])
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
 
 

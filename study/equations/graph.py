@@ -67,14 +67,19 @@ class Graph:
     names: list[str] = field(default_factory=list[str])
     values: list[float] = field(default_factory=list[float])
     _known: dict[tuple[Op, int, int], int] = field(default_factory=dict[tuple[Op, int, int], int])
+    _constants: dict[float, int] = field(default_factory=dict[float, int])
+    _depends: list[int] = field(default_factory=list[int])  # inputs that each node depends on: one bit each
     _derivatives: dict[tuple[int, int], int] = field(default_factory=dict[tuple[int, int], int])
 
     def _node(self, op: Op, a: int, b: int) -> int:
         key = (op, a, b)
-        if key not in self._known:
-            self._known[key] = len(self.nodes)
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = len(self.nodes)
             self.nodes.append(key)
-        return self._known[key]
+            leaf = op is Op.INPUT or op is Op.CONST
+            self._depends.append((op is Op.INPUT) << a if leaf else self._depends[a] | self._depends[b])
+        return known
 
     def input(self, name: str) -> int:
         """Node of a named input (a variable, a coefficient, a shape parameter)."""
@@ -83,9 +88,10 @@ class Graph:
         return self._node(Op.INPUT, self.names.index(name), 0)
 
     def const(self, value: float) -> int:
-        if value not in self.values:
+        if value not in self._constants:
+            self._constants[value] = self._node(Op.CONST, len(self.values), 0)
             self.values.append(value)
-        return self._node(Op.CONST, self.values.index(value), 0)
+        return self._constants[value]
 
     def constant_value(self, node: int) -> float | None:
         """The value of a constant node, None for any other."""
@@ -152,6 +158,8 @@ class Graph:
         """The exact partial derivative of a node by an input; that of ``sgn`` is taken as zero."""
         if node == wrt:
             return self.const(1.0)
+        if not self._depends[node] & self._depends[wrt]:
+            return self.const(0.0)
         key = (node, wrt)
         if key not in self._derivatives:
             self._derivatives[key] = self._differentiate(node, wrt)

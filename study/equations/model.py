@@ -6,6 +6,7 @@ None where it is to be estimated. Models are immutable; ``with_term`` and ``with
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from study.equations import formulas
@@ -28,7 +29,7 @@ class ModelTerm:
     place: Place = HERE
     starts: tuple[tuple[str, float], ...] = ()  # where a fit of what is open begins, by key
 
-    @property
+    @cached_property  # cached, as the others: a diagnosis asks for them a million times
     def name(self) -> str:
         """Name of the term, with its place if it has one: ``cubic_stiffness[floor2-floor3]``."""
         return self.term.name + self.place.suffix
@@ -43,7 +44,7 @@ class ModelTerm:
         """Names of its coefficients: ``k3``, or ``k3[floor2-floor3]``."""
         return self.keys[: len(self.coefficients)]
 
-    @property
+    @cached_property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
         own = tuple(symbol + self.place.suffix for symbol in self.term.symbols)

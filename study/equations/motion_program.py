@@ -63,7 +63,7 @@ def motion_program(
     return replace(made, program=made.program.with_inputs(known))
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=2048)
 def _compiled(model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...], switching: bool) -> MotionProgram:
     """The same of a model without values: a diagnosis runs each of its models many times."""
     made = Equations(model, any(sensor.motion == MOTIONS[2] for sensor in observed))
@@ -138,6 +138,11 @@ def jumping_signs(made: Equations) -> dict[int, Place]:
         if sign in needed:
             found.setdefault(sign, place)
     return found
+
+
+def places_with_friction(model: Model) -> int:
+    """Of how many places dry friction cuts the steps."""
+    return len(jumping_signs(Equations(model))) if model.modal is None else 0
 
 
 def _jumps(made: Equations) -> list[tuple[int, int, Place]]:

@@ -110,7 +110,7 @@ class Term:
     angle: bool = False  # whether its displacement is an angle, in radians: it is no effect of a coordinate in metres
     variation: "Variation | None" = None  # where it is what the coefficients of another term change by
 
-    @property
+    @cached_property
     def symbols(self) -> tuple[str, ...]:
         return tuple(c.symbol for c in self.components)
 
@@ -124,7 +124,7 @@ class Term:
         """How much a fit of it has to search for: shape parameters, and a memory."""
         return len(self.parameters) + (self.state is not None)
 
-    @property
+    @cached_property
     def keys(self) -> tuple[str, ...]:
         """Names of the coefficients, then of the shape parameters as ``term.parameter``."""
         return self.symbols + tuple(f"{self.name}.{p.name}" for p in self.parameters)

@@ -7,6 +7,7 @@ a single number describes is found together with the model's own coefficients.
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -54,6 +55,7 @@ from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
 from study.support import work
+from study.support.cores import side_by_side
 from study.support.errors import DivergenceError, expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -82,12 +84,18 @@ class SearchStage:
         """The effects that the record asks for."""
         return effects_beside(self.rich, self.left)
 
+    def again(self, prepared: Prepared) -> tuple[FittedResidual | None, FittedResidual | None]:
+        """Both models fitted to a record that is corrected otherwise; they may be one."""
+        models = [self.left, self.rich] if self.rich is not self.left else [self.left]
+        again = list(side_by_side(lambda one: left_again(one, prepared), models))
+        return again[0], again[-1]
+
     def without(self, fault: Fault) -> "SearchStage | None":
         """The stage with one fault more corrected, or all spikes; None where a model does not run any more."""
         again = [f for f in self.faults if f.fault == fault.fault == SPIKES and f.channel == fault.channel]
         known = (*(f for f in self.faults if f not in again), fault)
         prepared = corrected(self.given, known)
-        left, rich = (left_again(one, prepared) for one in (self.left, self.rich))
+        left, rich = self.again(prepared)
         if left is None or rich is None:
             return None
         for name in reversed(effects_beside(rich, left)):  # those that the corrected record no longer asks for go
@@ -265,13 +273,18 @@ def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> Se
     single one may not, none of them is searched for.
     """
     best = _best(stage.rich, [(n, channel) for n, channel in open_ones if n in (*HOLDABLE, HUM)], asked)
-    one = None if best is None else refined(best, stage.given, stage.faults, stage.rich)
+    alone, more = len(stage.rich.fit.model.coordinates) == 1, len(stage.effects) < EFFECTS
+    with ThreadPoolExecutor(1) as beside:
+        fault = beside.submit(
+            work.counted_here(lambda: None if best is None else refined(best, stage.given, stage.faults, stage.rich))
+        )
+        asked_for = more and alone and asks_for_more(stage.rich)  # whatever becomes of the fault
+        effect = missing(stage.rich) if asked_for else None
+        one = fault.result()
     if one is not None and one.fault.error > 0.0:  # chance alone may give such a value, so many having been asked for
         t = abs(one.fault.value) / one.fault.error
         one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
-    effect = None
-    alone = len(stage.rich.fit.model.coordinates) == 1
-    if len(stage.effects) < EFFECTS and (one is not None or (alone and asks_for_more(stage.rich))):
+    if one is not None and more and not asked_for:
         effect = missing(stage.rich)
     if one is None:
         return _noisy_force(stage, open_ones, asked) if effect is None else _beside(effect, stage)
@@ -384,7 +397,7 @@ def _needed(stage: SearchStage, asked: int, begun: Sequence[Fault]) -> SearchSta
         if fault.fault in (*HOLDABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
-            left, rich = (left_again(one, prepared) for one in (stage.left, stage.rich))
+            left, rich = stage.again(prepared)
             if left is None or rich is None:
                 continue
             # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
@@ -454,8 +467,9 @@ def _coarse(
     """
     step = float(amounts_on_both(left, fault_columns(DELAY, channel, left))[0][0])
     best = 0.0, left
-    for late in FAR_APART if abs(step) > 0.5 else ():
-        tried = left_again(left, corrected(given, (*faults, Fault(DELAY, channel, late))))
+    far = FAR_APART if abs(step) > 0.5 else ()
+    late_by = side_by_side(lambda x: left_again(left, corrected(given, (*faults, Fault(DELAY, channel, x)))), far)
+    for late, tried in zip(far, late_by, strict=True):
         if tried is not None and tried.relative_power < best[1].relative_power:
             best = late, tried
     return best

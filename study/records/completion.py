@@ -7,6 +7,7 @@ the record. Integration is limited to frequencies above a cut-off: drift and off
 by (2 pi f)^2, would otherwise dominate. The remaining band is reported, and judgements are limited to it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,17 +90,15 @@ def _derived(record: Record, coordinate: str, measured: list[str], cutoff: float
     """Each missing motion from the nearest measured one, by derivatives if there is a choice."""
     integrates = MOTIONS.index(measured[0]) > 0
     low = (suggest_cutoff(record, coordinate) if cutoff is None else cutoff) if integrates else 0.0
-    motions, sentences = dict[str, Floats](), list[str]()
-    for level, name in enumerate(MOTIONS):
-        if name in measured:
-            continue
-        below = [m for m in measured if MOTIONS.index(m) < level]
-        source = below[-1] if below else measured[0]
-        order = level - MOTIONS.index(source)
-        motions[name] = derivative(record[Sensor(coordinate, source)], record.dt, order, low)
-        sentences.append(
-            f"{name} is the {_OPERATION[order]} of the {source}{f' above {low:.4g} Hz' if order < 0 else ''}"
-        )
+    missing = [name for name in MOTIONS if name not in measured]  # two of one, or one
+    below = [name for name in measured if MOTIONS.index(name) < MOTIONS.index(missing[-1])]
+    source = below[-1] if below else measured[0]
+    orders = [MOTIONS.index(name) - MOTIONS.index(source) for name in missing]
+    motions = dict(zip(missing, derivatives(record[Sensor(coordinate, source)], record.dt, orders, low), strict=True))
+    sentences = [
+        f"{name} is the {_OPERATION[order]} of the {source}{f' above {low:.4g} Hz' if order < 0 else ''}"
+        for name, order in zip(missing, orders, strict=True)
+    ]
     return _Filled(motions, low, _edge(record, low) if integrates else NEAR_END, tuple(sentences))
 
 
@@ -127,6 +126,11 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     Orders 1 and 2 differentiate, -1 and -2 integrate, 0 only removes what lies below the cut-off. The gain is full
     above the cut-off (in hertz; above zero for an integral), zero below half of it, a raised cosine between.
     """
+    return derivatives(values, dt, (order,), cutoff)[0]
+
+
+def derivatives(values: Floats, dt: float, orders: Sequence[int], cutoff: float = 0.0) -> list[Floats]:
+    """:func:`derivative` of several orders, whose ends are continued once."""
     reach = max(CONTINUED, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else CONTINUED
     mean = float(np.mean(values))
     longer = with_continuations(values - mean, min(reach, 8 * len(values)))
@@ -134,16 +138,21 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     spectrum = rfft(longer, size)
     frequency = np.asarray(rfftfreq(size, dt))
     omega = 2.0 * np.pi * frequency
-    gain = np.ones_like(frequency)
+    kept = np.ones_like(frequency)
     if cutoff > 0.0:
-        gain = 0.5 - 0.5 * np.cos(np.pi * np.clip(2.0 * frequency / cutoff - 1.0, 0.0, 1.0))
-    np.divide(gain, omega**-order, out=gain, where=omega > 0.0) if order < 0 else np.multiply(gain, omega**order, gain)
-    turned = spectrum * gain * 1j**order
-    if size % 2 == 0 and order % 2:
-        turned[-1] = 0.0  # the Nyquist line of an odd derivative has no real part
-    before = (len(longer) - len(values)) // 2
-    result = irfft(turned, size)[before : before + len(values)]
-    return result + mean if order == 0 and cutoff == 0.0 else np.asarray(result)
+        kept = 0.5 - 0.5 * np.cos(np.pi * np.clip(2.0 * frequency / cutoff - 1.0, 0.0, 1.0))
+    before, found = (len(longer) - len(values)) // 2, list[Floats]()
+    for order in orders:
+        if order < 0:
+            gain = np.divide(kept, omega**-order, out=kept.copy(), where=omega > 0.0)
+        else:
+            gain = kept * omega**order
+        turned = spectrum * gain * 1j**order
+        if size % 2 == 0 and order % 2:
+            turned[-1] = 0.0  # the Nyquist line of an odd derivative has no real part
+        result = irfft(turned, size)[before : before + len(values)]
+        found.append(result + mean if order == 0 and cutoff == 0.0 else np.asarray(result))
+    return found
 
 
 def with_continuations(values: Floats, reach: int) -> Floats:

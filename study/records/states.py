@@ -44,7 +44,7 @@ def starting_states(
     for i, coordinate in enumerate(coordinates):
         own = Sensor(coordinate, "displacement")
         if own in outputs.sensors:
-            states[:, :, i] = _smoothed(record, str(own), samples, reach)
+            states[:, :, i] = _smoothed(record, str(own), tuple(samples), reach)
             continue
         for row, motion in enumerate(MOTIONS[:2]):  # of a prescribed motion too, where the force is what is predicted
             channel = str(Sensor(coordinate, motion))
@@ -52,7 +52,8 @@ def starting_states(
     return states.reshape(len(samples), -1)
 
 
-def _smoothed(record: Record, displacement: str, samples: Sequence[int], reach: float) -> Floats:
+@lru_cache(maxsize=16)  # every candidate asks for the same
+def _smoothed(record: Record, displacement: str, samples: tuple[int, ...], reach: float) -> Floats:
     """Displacement and velocity of one coordinate from its displacement, shape (samples, 2)."""
     values = record[displacement]
     if record.stretches:  # a wrong velocity may keep the fit of a stretch's state from its minimum

@@ -11,6 +11,7 @@ algebra than one in a single segment.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -37,16 +38,27 @@ class Normal:
     right: Floats  # of the shared columns with the residual, shape (k,)
     own_right: Floats  # of the own columns with it, shape (N, f)
 
+    @cached_property
+    def _parts(self) -> tuple[Floats, Floats, Floats]:
+        """Eigenvalues and eigenvectors of the own columns' products, and right sides along these."""
+        values, vectors = np.linalg.eigh(self.own)
+        return values, vectors, vectors.transpose(0, 2, 1) @ self._right
+
+    @cached_property
+    def _right(self) -> Floats:
+        """Right sides of the own variables: one for each shared variable, then their own, shape (N, f, k + 1)."""
+        return np.concatenate([self.cross.transpose(0, 2, 1), self.own_right[:, :, None]], axis=2)
+
     def _eliminated(self, damping: float) -> tuple[Floats, Floats]:
         """The own variables' answer to a change of each shared one, (N, f, k), and to their right side, (N, f)."""
-        right = np.concatenate([self.cross.transpose(0, 2, 1), self.own_right[:, :, None]], axis=2)
         if self.links is not None:
-            solved = _tridiagonal(self.own, self.links, damping, right)
+            solved = _tridiagonal(self.own, self.links, damping, self._right)
         else:
-            values, vectors = np.linalg.eigh(self.own)
-            known = values + damping > INDISTINCT  # a segment may not determine every direction
-            inverse = np.where(known, 1.0 / np.where(known, values + damping, 1.0), 0.0)
-            solved = (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
+            values, vectors, right = self._parts
+            damped = values + damping
+            known = damped > INDISTINCT  # a segment may not determine every direction
+            inverse = np.divide(1.0, damped, out=np.zeros_like(damped), where=known)
+            solved = (vectors * inverse[:, None, :]) @ right
         return solved[:, :, :-1], solved[:, :, -1]
 
     def _left(self, damping: float, answers: Floats, alone: Floats) -> tuple[Floats, Floats]:

@@ -352,7 +352,7 @@ class _Problem:
         point = self.linearise(x)
         if point is None:
             values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
-            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.time(0))
+            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.start)
         return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset, self.cost)
 
 

@@ -198,7 +198,7 @@ class JudgingRun:
         before = self.prepared.plan.judge[0] - self.first
         derivatives = run.respond(values, self.initial, run.moving)[1][before:].copy()  # as in `motions`
         if not np.all(np.abs(derivatives) < BEYOND_MEASURE):
-            raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
+            raise DivergenceError("the derivatives of the free run leave the range of numbers", run.start)
         return _known(derivatives, self.prepared, self.prepared.plan.judge)
 
     def _run(

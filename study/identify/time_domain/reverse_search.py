@@ -22,7 +22,7 @@ from study.equations.place import Place
 from study.equations.terms import LINEAR
 from study.identify.frequency_domain.inputs import input_history, placed_inputs, relative_record
 from study.identify.time_domain.part_fit import linearise
-from study.records.completion import derivative
+from study.records.completion import derivatives
 from study.records.noise_floor import band_above_noise, in_band
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
@@ -167,9 +167,9 @@ def corrected_motion(
             continue
         for part in runs:
             seen = values[part] if prepared.record.stretches else in_band(values[part], prepared.dt, *band)
-            for order in range(len(MOTIONS)):
-                steps = order - level
-                change = derivative(seen, prepared.dt, steps, prepared.band[0] if steps < 0 else 0.0)
+            steps, low = [order - level for order in range(len(MOTIONS))], prepared.band[0]
+            summed = derivatives(seen, prepared.dt, [s for s in steps if s < 0], low) if level else []
+            for order, change in enumerate(summed + derivatives(seen, prepared.dt, [s for s in steps if s >= 0])):
                 if prepared.record.stretches:  # each begins and ends with a step, which no filter may meet before
                     change = in_band(change, prepared.dt, *band)
                 motion[order, part, coordinates.index(sensor.coordinate)] += change

@@ -19,7 +19,7 @@ from study.equations.free_run import needed_steps
 from study.equations.kernels import WRITTEN_OUT
 from study.equations.linear_part import transfer
 from study.equations.model import Model, ModelTerm
-from study.equations.motion_program import motion_program
+from study.equations.motion_program import places_with_friction
 from study.equations.place import Place
 from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.modal_lines import left_of_lines
@@ -225,7 +225,9 @@ def sensitivities(points: Sequence[Point], base: Baseline) -> list[Floats | None
     Each is there with an amount of zero, so that the motion is the model's own whatever stands beside it. Not so where
     one brings dry friction along, at whose reversals steps are cut: that runs by itself.
     """
-    by_itself = {e.name: base.prescribed or _cuts_steps(e, base) for e in {e.name: e for e, _ in points}.values()}
+    model, own = base.fit.model, places_with_friction(base.fit.model)
+    entries = {e.name: e for e, _ in points}.values()
+    by_itself = {e.name: base.prescribed or places_with_friction(model.with_term(e)) > own for e in entries}
     runs: list[list[int]] = []
     for i, (entry, _) in enumerate(points):
         there = ([points[at][0] for at in run] for run in runs)
@@ -244,15 +246,6 @@ def _has_room(there: Sequence[ModelTerm], entry: ModelTerm) -> bool:
     """Whether a run takes one candidate more, another than those that are there."""
     columns = 1 + sum(len(other.symbols) for other in (*there, entry))
     return columns <= WRITTEN_OUT and entry.name not in {other.name for other in there}
-
-
-def _cuts_steps(entry: ModelTerm, base: Baseline) -> bool:
-    """Whether a candidate brings dry friction to a model that has none there."""
-    own, grown = (
-        len(motion_program(model, tuple(model.values), base.fit.outputs.sensors).sides)
-        for model in (base.fit.model, base.fit.model.with_term(entry))
-    )
-    return grown > own
 
 
 def _along_one_run(points: Sequence[Point], base: Baseline) -> list[Floats | None]:
