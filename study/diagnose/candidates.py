@@ -127,23 +127,32 @@ def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | N
 
     Of two sides of a place the better stays.
     """
-    if not base.several:
-        begins = zip(entries, starts_of(entries, base), strict=True)
-        return _fitted([Screened(entry, tuple(points)) for entry, points in begins], base, progress)
-    ordered = screened(entries, base)
-    chosen, tried = worth_fitting(ordered), list[FittedCandidate]()
+    if base.several:
+        ordered = screened(entries, base)
+        chosen = worth_fitting(ordered)
+    else:  # every one, the most promising first: the search may end among them
+        ordered = chosen = sorted(_screened(entries, base), key=lambda item: -item.share)
+    tried = list[FittedCandidate]()
     for first in range(0, len(chosen), MOST_PROMISING):
-        if not work.is_done():
-            tried += _fitted(chosen[first : first + MOST_PROMISING], base, progress, first)
+        if first == 0 or not work.is_done():
+            tried += _fitted(chosen[first : first + MOST_PROMISING], base, progress, first, len(chosen))
+    if not base.several:
+        names = [entry.name for entry in entries]
+        return sorted(tried, key=lambda candidate: names.index(candidate.entry.name))
     if not work.is_done():
-        tried += _fitted(elsewhere(tried, ordered), base, progress, len(chosen))
+        others = elsewhere(tried, ordered)
+        tried += _fitted(others, base, progress, len(chosen), len(chosen) + len(others))
     return _one_side(tried)
 
 
 def screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:
     """Candidates with the points that explain most, the most promising first; those that explain nothing left out."""
-    tried = [Screened(e, tuple(points)) for e, points in zip(entries, starts_of(entries, base), strict=True)]
-    return sorted((item for item in tried if item.points and item.share > 0.0), key=lambda item: -item.share)
+    tried = (item for item in _screened(entries, base) if item.points and item.share > 0.0)
+    return sorted(tried, key=lambda item: -item.share)
+
+
+def _screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:
+    return [Screened(e, tuple(points)) for e, points in zip(entries, starts_of(entries, base), strict=True)]
 
 
 def worth_fitting(ordered: Sequence[Screened]) -> list[Screened]:
@@ -184,7 +193,8 @@ def those_not_tried(
     """Fit and judge every candidate that promised too little; of two sides of a place the better stays."""
     done = {c.entry.effect for c in tried}
     left = [entry for entry in entries if entry.effect not in done]
-    return _one_side(_fitted(screened(left, base), base, progress, len(tried)))
+    more = screened(left, base)
+    return _one_side(_fitted(more, base, progress, len(tried), len(tried) + len(more)))
 
 
 def _worse(candidate: FittedCandidate) -> tuple[bool, float]:
@@ -199,7 +209,7 @@ def _one_side(candidates: Sequence[FittedCandidate]) -> list[FittedCandidate]:
 
 
 def _fitted(
-    chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0
+    chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int, total: int
 ) -> list[FittedCandidate]:
     done: list[FittedCandidate] = []
 
@@ -211,7 +221,7 @@ def _fitted(
         if candidate is not None:
             done.append(candidate)
         if progress is not None:
-            progress(count, before + len(chosen), "single effects")
+            progress(count, total, "single effects")
     return done
 
 

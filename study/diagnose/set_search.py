@@ -120,7 +120,7 @@ def searched(
     try:
         _grow(search, reverse, sizes, done, fewer_than, progress)
         # of a structure's many places those that were not tried are missing from the whole
-        if from_above and not (base.several or done(min(search.tried.values(), key=by_power))):
+        if from_above and search.tried and not (base.several or done(min(search.tried.values(), key=by_power))):
             _reduce(search, sizes, progress)
         _side_valleys(search, sizes)
     except (KeyboardInterrupt, WorkDoneError) as end:  # what was found so far is there to be told

@@ -129,8 +129,9 @@ def _diagnosed(
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
     own, elsewhere = comparison.fit.model.terms, 0
     tried = candidates.try_all(entries, base, progress)
+    ended = f"{work.ENDED} at single effects" if work.is_done() else ""
     changes = promised_changes(comparison.fit, comparison.prepared, own)
-    if changes is not None and not work.is_done() and varying_candidates.first_of_all(tried, changes, comparison):
+    if changes is not None and not ended and varying_candidates.first_of_all(tried, changes, comparison):
         other = _changing(changes, comparison, base, tried, entries, progress)
         if other is not None and other.changes:
             return other  # else nothing that is named changes, and the record is judged as it was
@@ -139,6 +140,8 @@ def _diagnosed(
     if (freed := _freed(comparison, base, tried)) is not None:
         return _diagnosed(freed, extra, without, progress)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
+    if ended:
+        return replace(found, ended=found.ended or ended)
     more = [] if work.is_done() else _where_none_explains_it(found, base, tried, entries, progress)
     if more:
         tried = [*tried, *more]
@@ -404,6 +407,8 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
     """Sets near the best in their order, settled as they would be if they were added."""
     alone = {row.name: row for row in rows}
     every = sorted(search.tried.values(), key=by_power)
+    if not every:  # nothing that was asked for has a finite motion
+        return []
     best = every[0]
     near = [c for c in every if statistics.worse(c.prediction.residual, best.prediction.residual) < 2.0 * K][:RIVALS]
     near += [c for names, c in search.tried.items() if c not in near and any(names < set(n.names) for n in near[:3])]

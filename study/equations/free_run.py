@@ -64,7 +64,7 @@ class FreeRun:
         """Times of samples along the motions in seconds, shape (samples,)."""
         begins, starts = np.array([s[0] for s in self.starts]), np.array([s[1] for s in self.starts])
         of = np.searchsorted(begins, samples, side="right") - 1
-        return starts[of] + (samples - begins[of]) * self.dt
+        return np.asarray(starts[of] + (samples - begins[of]) * self.dt, dtype=np.float64)
 
     @property
     def length(self) -> int:

@@ -154,7 +154,7 @@ def _accounted(
     model: Model, prepared: Prepared, known: Held, switched_off: Sequence[str], estimator: str,
     progress: Callable[[str], None] | None, as_sampled: bool, *, changes: bool,
 ) -> Accounted:  # fmt: skip
-    with work.limited_to(work.most_for(len(prepared.record))):
+    with work.limited_to(work.most_for(len(prepared.record)) / 2.0):  # the other half is for what is missing
         found = _corrected(model, prepared, known, switched_off, as_sampled, changes=changes)
         ready = replace(found.prepared, notes=(*found.prepared.notes, PUT_OFF)) if found.put_off else found.prepared
         comparison = _compared(model, ready, found.faults, found.fit, estimator, progress)

@@ -12,7 +12,7 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 Result = TypeVar("Result")
 
-MOST = 20e9, 20e9 / 8192
+MOST = 80e9, 80e9 / 8192
 ENDED = "at its limit of work (--thorough goes on)"
 
 

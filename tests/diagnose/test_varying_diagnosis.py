@@ -1,5 +1,6 @@
 """Coefficients that vary, found: along time, with a channel, in a step; and not where something else is missing."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -78,20 +79,13 @@ def test_in_one_decay_nothing_changes_with_time_as_its_amplitude_falls_with_it(m
     assert any(entry.name == "linear_damping_over_time" for entry in seen.shares)
 
 
-@pytest.mark.parametrize(
-    ("beside", "changes", "ended", "asked"),
-    [(True, False, "", [False]), (True, True, "", [False, True]), (True, True, "by hand", [False]),
-     (False, True, "", [True])],
-)  # fmt: skip
-def test_beside_what_is_named_a_change_has_to_gain_before_all_effects_are_asked_for_at_once(
-    monkeypatch: pytest.MonkeyPatch, beside: bool, changes: bool, ended: str, asked: list[bool]
-):
-    """Nor are they where the user has ended the search; nothing is fitted here."""
+def grown_and_whole(monkeypatch: pytest.MonkeyPatch, grown: Any, whole: Any, beside: bool) -> tuple[list[bool], Any]:
+    """What is asked for, and what stands, where two searches end in these diagnoses; nothing is fitted here."""
     made: list[bool] = []
 
     def diagnosis(*_: Any, from_above: bool = True, **__: Any) -> Any:
         made.append(from_above)
-        return SimpleNamespace(changes=changes, ended=ended)
+        return whole if from_above else grown
 
     comparison: Any = SimpleNamespace()
     seen = SimpleNamespace(comparison=comparison, entries=[])
@@ -100,8 +94,35 @@ def test_beside_what_is_named_a_change_has_to_gain_before_all_effects_are_asked_
     monkeypatch.setattr(verdict.varying_candidates, "simplest", lambda _: [])
     monkeypatch.setattr(verdict.candidates, "try_all", lambda *_: [])
     nothing: Any = None
-    verdict._changing(nothing, comparison, nothing, [nothing], [], None, beside=beside)
+    return made, verdict._changing(nothing, comparison, nothing, [nothing], [], None, beside=beside)
+
+
+@dataclass(frozen=True)
+class Said:
+    """Of a diagnosis what is asked here."""
+
+    changes: bool
+    ended: str = ""
+
+
+@pytest.mark.parametrize(
+    ("beside", "grown", "asked"),
+    [(True, Said(False), [False]), (True, Said(True), [False, True]), (True, Said(True, "by hand"), [False]),
+     (False, Said(True), [True])],
+)  # fmt: skip
+def test_beside_what_is_named_a_change_has_to_gain_before_all_effects_are_asked_for_at_once(
+    monkeypatch: pytest.MonkeyPatch, beside: bool, grown: Said, asked: list[bool]
+):
+    """Nor are they where the user has ended the search."""
+    whole = Said(True)
+    made, stands = grown_and_whole(monkeypatch, grown, whole, beside)
     assert made == asked
+    assert stands is (whole if asked[-1] else grown)
+
+
+def test_a_change_that_gained_stands_where_asking_for_all_at_once_comes_to_no_end(monkeypatch: pytest.MonkeyPatch):
+    _, stands = grown_and_whole(monkeypatch, Said(True), Said(False, "at its limit"), beside=True)
+    assert stands == Said(True, "at its limit")
 
 
 def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
-from study.records.completion import complete, consistent, derivative, suggest_cutoff
+from study.records.completion import complete, consistent, derivative, derivatives, suggest_cutoff
 from study.records.record import MOTIONS, Record
 from study.support.autoregression import burg
 from study.support.errors import StudyError
@@ -99,6 +99,13 @@ def test_offset_and_drift_of_an_accelerometer_do_not_matter() -> None:
     alone = only(record.with_channels({"acceleration": record["acceleration"] + drift}), "acceleration")
     got = complete(alone, 0.5)
     assert error(got.record["displacement"], clean.record["displacement"], got.edge) < 0.01
+
+
+@pytest.mark.parametrize(("orders", "cutoff"), [((0, 1, 2), 0.0), ((-1, -2), 0.2), ((1, 2), 0.2)])
+def test_several_at_once_are_those_one_by_one(orders: tuple[int, ...], cutoff: float) -> None:
+    signal = np.random.default_rng(5).standard_normal(700).cumsum()
+    for order, got in zip(orders, derivatives(signal, DT, orders, cutoff), strict=True):
+        np.testing.assert_array_equal(got, derivative(signal, DT, order, cutoff))
 
 
 def test_a_naive_derivative_is_worse_at_the_ends() -> None:

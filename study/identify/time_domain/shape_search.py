@@ -130,8 +130,8 @@ class Screened:
 
     @property
     def share(self) -> float:
-        """Of the residual, that it explains at the best of these points."""
-        return self.points[0].share
+        """Of the residual, that it explains at the best of these points; zero without any."""
+        return self.points[0].share if self.points else 0.0
 
 
 def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
