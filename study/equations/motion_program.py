@@ -63,7 +63,7 @@ def motion_program(
     return replace(made, program=made.program.with_inputs(known))
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=1024)
 def _compiled(model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...], switching: bool) -> MotionProgram:
     """The same of a model without values: a diagnosis runs each of its models many times."""
     made = Equations(model, any(sensor.motion == MOTIONS[2] for sensor in observed))

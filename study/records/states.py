@@ -1,7 +1,7 @@
 """Displacement and velocity at some instants of a record, and the angular rate of its motion."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -9,8 +9,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from study.records.outputs import Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.arrays import Floats
+from study.support.recent import Recent
 
 REACH = 0.2  # half width, in periods, of the cubic that smooths a displacement into a state
+_STATES = Recent(most=16, largest=1 << 23)  # every candidate asks for the same; a long record is not kept for it
 
 
 def angular_rate(values: Floats, dt: float) -> float:
@@ -44,7 +46,8 @@ def starting_states(
     for i, coordinate in enumerate(coordinates):
         own = Sensor(coordinate, "displacement")
         if own in outputs.sensors:
-            states[:, :, i] = _smoothed(record, str(own), tuple(samples), reach)
+            of = record, str(own), tuple(samples), reach
+            states[:, :, i] = _STATES.get(of, 8 * len(record) * len(record.channels), partial(_smoothed, *of))
             continue
         for row, motion in enumerate(MOTIONS[:2]):  # of a prescribed motion too, where the force is what is predicted
             channel = str(Sensor(coordinate, motion))
@@ -52,7 +55,6 @@ def starting_states(
     return states.reshape(len(samples), -1)
 
 
-@lru_cache(maxsize=16)  # every candidate asks for the same
 def _smoothed(record: Record, displacement: str, samples: tuple[int, ...], reach: float) -> Floats:
     """Displacement and velocity of one coordinate from its displacement, shape (samples, 2)."""
     values = record[displacement]
