@@ -6,7 +6,6 @@ of the numbers which the simulation yields, not of an idealisation of them.
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -19,8 +18,8 @@ from study.records.interpolation import between_runs, between_samples_kept, in_c
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
-from study.support import work
 from study.support.arrays import Floats, Ints
+from study.support.cores import two_at_once
 from study.support.errors import DivergenceError, StudyError, expect
 from study.support.recent import Recent
 
@@ -153,10 +152,10 @@ class FreeRun:
             self._integrate(motion, bounds, state, out)
         else:
             half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
-            with ThreadPoolExecutor(1) as beside:
-                other = beside.submit(work.counted_here(self._integrate), motion, bounds[half:], state[half:], out)
-                self._integrate(motion, bounds[: half + 1], state[:half], out)
-                other.result()
+            two_at_once(
+                lambda: self._integrate(motion, bounds[half:], state[half:], out),
+                lambda: self._integrate(motion, bounds[: half + 1], state[:half], out),
+            )
         if self.places is not None:
             out = out[self.places]
         return out, state[:-1]

@@ -7,7 +7,6 @@ a single number describes is found together with the model's own coefficients.
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -55,7 +54,7 @@ from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
 from study.support import work
-from study.support.cores import side_by_side
+from study.support.cores import side_by_side, two_at_once
 from study.support.errors import DivergenceError, expect
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -274,17 +273,19 @@ def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> Se
     """
     best = _best(stage.rich, [(n, channel) for n, channel in open_ones if n in (*HOLDABLE, HUM)], asked)
     alone, more = len(stage.rich.fit.model.coordinates) == 1, len(stage.effects) < EFFECTS
-    with ThreadPoolExecutor(1) as beside:
-        fault = beside.submit(
-            work.counted_here(lambda: None if best is None else refined(best, stage.given, stage.faults, stage.rich))
-        )
-        asked_for = more and alone and asks_for_more(stage.rich)  # whatever becomes of the fault
-        effect = missing(stage.rich) if asked_for else None
-        one = fault.result()
+
+    def of_physics() -> tuple[bool, FittedResidual | None]:
+        """Whether an effect is asked for whatever becomes of the fault, and that effect."""
+        sure = more and alone and asks_for_more(stage.rich)
+        return sure, missing(stage.rich) if sure else None
+
+    one, (sure, effect) = two_at_once(
+        lambda: None if best is None else refined(best, stage.given, stage.faults, stage.rich), of_physics
+    )
     if one is not None and one.fault.error > 0.0:  # chance alone may give such a value, so many having been asked for
         t = abs(one.fault.value) / one.fault.error
         one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
-    if one is not None and more and not asked_for:
+    if one is not None and more and not sure:
         effect = missing(stage.rich)
     if one is None:
         return _noisy_force(stage, open_ones, asked) if effect is None else _beside(effect, stage)

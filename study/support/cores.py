@@ -9,6 +9,7 @@ from study.support import work
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 
 def cores() -> int:
@@ -21,6 +22,14 @@ def cores() -> int:
 def one_thread_of_algebra() -> None:
     """Keep NumPy, which is not to be loaded yet, from threads of its own: beside others they wait and take a core."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def two_at_once(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
+    """Results of two functions, the first in a thread of its own; what it does is counted here."""
+    with ThreadPoolExecutor(1) as beside:
+        begun = beside.submit(work.counted_here(one))
+        second = other()
+        return begun.result(), second
 
 
 def side_by_side(
