@@ -27,7 +27,7 @@ COMPILED = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.s
 SOURCES = Path(__file__).parent / "c"
 PROJECT = "reverse-miso-study"
 NO_MEMORY = -2  # what a function returns that found none
-WRITTEN_OUT = 12  # columns up to which a step's loops are: more take twice as long
+WRITTEN_OUT = 12  # columns that a step treats at once; of more it takes one part after the other
 ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and n(umbers)
     "evaluate": "aww a aw aw aw a",
     "integrate": "w awwww a aww aw aaa anw aw aw aww w aw waa",

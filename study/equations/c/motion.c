@@ -11,7 +11,8 @@
 
 #define FAR 1e150 /* whose square is still a number, its cube is not */
 enum { SUMMED, ONE_BY_ONE, ADAMS }; /* methods, as in kernels.py */
-enum { WIDEST = 12 };               /* of the widths that are written out */
+enum { WIDEST = 12 };               /* columns at once, which a processor keeps in its registers */
+#define EACH_WIDTH(DO) DO(2) DO(4) DO(6) DO(8) DO(10) DO(12)
 
 static const double ZERO = 0.0;
 
@@ -43,8 +44,24 @@ static void set_rounding(Rounding mode) { (void)mode; }
 
 /*
  * The functions below are written out for each small width: the compiler then leaves out the loops over a row and keeps
- * it in the processor's registers.
+ * it in the processor's registers. A wider row is treated in parts. A pair of columns is one operation: left to itself
+ * a compiler sees that of some rows, and not of others.
  */
+#if defined(__GNUC__)
+typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
+static inline Pair pair(double first, double second) { return (Pair){first, second}; }
+static inline Pair plus(Pair a, double by, Pair b) { return a + pair(by, by) * b; }
+static inline double first_of(Pair a) { return a[0]; }
+static inline Pair with_first(Pair a, double first) { return pair(first, a[1]); }
+#else
+typedef struct {
+    double first, second;
+} Pair;
+static inline Pair pair(double first, double second) { return (Pair){first, second}; }
+static inline Pair plus(Pair a, double by, Pair b) { return pair(a.first + by * b.first, a.second + by * b.second); }
+static inline double first_of(Pair a) { return a.first; }
+static inline Pair with_first(Pair a, double first) { return pair(first, a.second); }
+#endif
 
 static inline double *register_of(const Motion *m, int64_t state) { return m->program.r + 1 + m->drives + state; }
 
@@ -54,38 +71,38 @@ static inline void drive_registers(const Motion *m, double time, const double *d
     for (int64_t c = 0; c < m->drives; c++) r[1 + c] = drive[c];
 }
 
-/* A row where the program has run at the states `at`; `count` is all columns, or one. */
+/* Columns of a row, from `first` on, where the program has run at the states `at`. */
 static inline void computed(
-    const Motion *m, int64_t row, const double *restrict at, double *restrict to, int64_t width, int64_t count
+    const Motion *m, int64_t row, const double *at, Pair *restrict to, int64_t width, int64_t first, int64_t pairs
 ) {
-    const double *const *direct = m->direct + row * width;
-    const Partial *key = m->by_key + m->key_ends[row], *last_key = m->by_key + m->key_ends[row + 1];
+    const double *const *direct = m->direct + row * width + first;
     const Partial *state = m->by_state + m->ends[row], *last_state = m->by_state + m->ends[row + 1];
-    if (count <= WIDEST)
-        for (int64_t c = 0; c < count; c++) to[c] = *direct[c];
-    else {
-        memset(to, 0, (size_t)count * sizeof(double));
-        for (; key < last_key; key++) to[key->of] = *key->from;
-    }
-    if (count == 1) return;
+    for (int64_t c = 0; c < pairs; c++) to[c] = pair(*direct[2 * c], *direct[2 * c + 1]);
     for (; state < last_state; state++) {
         double by = *state->from;
-        const double *row_of_state = at + state->of * width;
-        for (int64_t c = 0; c < count; c++) to[c] += by * row_of_state[c];
+        const Pair *row_of_state = (const Pair *)(at + state->of * width + first);
+        for (int64_t c = 0; c < pairs; c++) to[c] = plus(to[c], by, row_of_state[c]);
     }
-    to[0] = *direct[0];
+    if (first == 0) to[0] = with_first(to[0], *direct[0]);
 }
 
 /* The same of the slope of a state. */
 static inline void slope_of(
-    const Motion *m, int64_t i, const double *restrict at, double *restrict to, int64_t width, int64_t count
+    const Motion *m, int64_t i, const double *at, Pair *restrict to, int64_t width, int64_t first, int64_t pairs
 ) {
+    const Pair *velocity = (const Pair *)(at + (m->dofs + i) * width + first);
     if (i < m->dofs)
-        for (int64_t c = 0; c < count; c++) to[c] = at[(m->dofs + i) * width + c];
+        for (int64_t c = 0; c < pairs; c++) to[c] = velocity[c];
     else if (i == m->dofs && m->friction.alone)
-        for (int64_t c = 0; c < count; c++) to[c] = 0.0;
+        for (int64_t c = 0; c < pairs; c++) to[c] = pair(0.0, 0.0);
     else
-        computed(m, i - m->dofs, at, to, width, count);
+        computed(m, i - m->dofs, at, to, width, first, pairs);
+}
+
+/* The slope itself, without derivatives. */
+static inline double slope_alone(const Motion *m, int64_t i, const double *at, int64_t width) {
+    if (i < m->dofs) return at[(m->dofs + i) * width];
+    return i == m->dofs && m->friction.alone ? 0.0 : *m->direct[(i - m->dofs) * width];
 }
 
 /* The same of all states where friction holds something: each slope depends on all others. */
@@ -100,13 +117,36 @@ static void advance_held(Motion *m, const double *at, double *next, double weigh
     }
 }
 
+/* Columns of a state in one stage of a step: slopes at `at`, added to the sum, and the next trial. */
+static inline void advance(
+    Motion *m, int64_t i, const double *at, double *next, double weight, double ahead, int64_t width, int64_t first,
+    int64_t count
+) {
+    int64_t begin = i * width + first, pairs = count / 2;
+    if (count == 1) {
+        double slope = slope_alone(m, i, at, width);
+        m->sum[begin] += weight * slope;
+        *register_of(m, i) = next[begin] = m->state[begin] + ahead * slope;
+        return;
+    }
+    Pair slope[WIDEST / 2] = {{0.0, 0.0}};
+    Pair *restrict sum = (Pair *)(m->sum + begin), *restrict to = (Pair *)(next + begin);
+    const Pair *restrict state = (const Pair *)(m->state + begin);
+    slope_of(m, i, at, slope, width, first, pairs);
+    if (first == 0) *register_of(m, i) = first_of(plus(state[0], ahead, slope[0]));
+    for (int64_t c = 0; c < pairs; c++) {
+        sum[c] = plus(sum[c], weight, slope[c]);
+        to[c] = plus(state[c], ahead, slope[c]);
+    }
+}
+
 /*
  * One stage of a step: slopes at `at`, whose state the registers hold, added to the sum; the next trial and the
  * registers of its state follow. What was just computed goes on in the processor, not by way of the memory.
  */
 static inline void stage_of(
-    Motion *m, double time, const double *drive, const double *restrict at, double *restrict next, double weight,
-    double ahead, int64_t width, int64_t count
+    Motion *m, double time, const double *drive, const double *at, double *next, double weight, double ahead,
+    int64_t width, int64_t count
 ) {
     int64_t together = m->friction.held_any && !m->friction.alone;
     if (!m->ran) {
@@ -121,17 +161,18 @@ static inline void stage_of(
         return;
     }
     for (int64_t i = 0; i < m->states; i++) {
-        double own[WIDEST] = {0.0}, *room = count <= WIDEST ? own : m->total;
-        double *restrict sum = m->sum + i * width, *restrict to = next + i * width;
-        const double *restrict state = m->state + i * width, *restrict total = room;
-        if (count > WIDEST && i < m->dofs)
-            total = at + (m->dofs + i) * width;
-        else
-            slope_of(m, i, at, room, width, count);
-        *register_of(m, i) = state[0] + ahead * total[0];
-        for (int64_t c = 0; c < count; c++) {
-            sum[c] += weight * total[c];
-            to[c] = state[c] + ahead * total[c];
+        int64_t first = 0;
+        if (count <= WIDEST) {
+            advance(m, i, at, next, weight, ahead, width, 0, count);
+            continue;
+        }
+        for (; count - first > WIDEST; first += WIDEST) advance(m, i, at, next, weight, ahead, width, first, WIDEST);
+        switch (count - first) {
+#define REST(columns)                                                  \
+    case columns:                                                      \
+        advance(m, i, at, next, weight, ahead, width, first, columns); \
+        break;
+            EACH_WIDTH(REST)
         }
     }
 }
@@ -163,14 +204,23 @@ void step_on(Motion *m, double time, double h, const double *drive, int64_t colu
     case width:                                   \
         step_of(m, time, h, drive, width, width); \
         return;
-        STEP(2) STEP(4) STEP(6) STEP(8) STEP(10) STEP(12)
+        EACH_WIDTH(STEP)
     default:
         step_of(m, time, h, drive, m->width, m->width);
     }
 }
 
 void row_of(const Motion *m, int64_t row, const double *at, double *to) {
-    computed(m, row, at, to, m->width, m->columns);
+    const double *const *direct = m->direct + row * m->width;
+    const Partial *key = m->by_key + m->key_ends[row], *last_key = m->by_key + m->key_ends[row + 1];
+    const Partial *state = m->by_state + m->ends[row], *last_state = m->by_state + m->ends[row + 1];
+    memset(to, 0, (size_t)m->columns * sizeof(double));
+    for (; key < last_key; key++) to[key->of] = *key->from;
+    for (; state < last_state; state++) {
+        double by = *state->from;
+        for (int64_t c = 1; c < m->columns; c++) to[c] += by * at[state->of * m->width + c];
+    }
+    to[0] = *direct[0];
 }
 
 void run_here(Motion *m, double time, const double *drive) {
@@ -246,7 +296,7 @@ static int64_t along_adams(
         double *f2 = ring + ((step + 2) & 3) * n, *f3 = ring + ((step + 1) & 3) * n;
         const double *now = drive + 2 * step * m->drives;
         run_here(m, time, now);
-        for (int64_t i = 0; i < n; i++) slope_of(m, i, m->state, f0 + i, 1, 1);
+        for (int64_t i = 0; i < n; i++) f0[i] = slope_alone(m, i, m->state, 1);
         if (step % steps == 0 && !observe(m, observed, count, out + step / steps * count)) return step / steps;
         if (step == total) break;
         if (step < 3) {
@@ -259,7 +309,7 @@ static int64_t along_adams(
         }
         drive_registers(m, time + h, now + 2 * m->drives);
         run_prepared(&m->program);
-        for (int64_t i = 0; i < n; i++) slope_of(m, i, m->trial, late + i, 1, 1);
+        for (int64_t i = 0; i < n; i++) late[i] = slope_alone(m, i, m->trial, 1);
         for (int64_t i = 0; i < n; i++) {
             double past = 19.0 * f0[i] - 5.0 * f1[i] + f2[i];
             m->state[i] += h / 24.0 * (9.0 * late[i] + past);
@@ -316,7 +366,7 @@ static int prepare_room(Motion *m) {
     m->key_ends = malloc((rows + 1) * sizeof(int64_t));
     m->by_state = malloc((rows * states + 1) * sizeof(Partial));
     m->ends = malloc((rows + 1) * sizeof(int64_t));
-    m->state = calloc(4 * size + 4 * states + 3 * (size_t)m->drives + width + of_friction, sizeof(double));
+    m->state = calloc(4 * size + 4 * states + 3 * (size_t)m->drives + of_friction, sizeof(double));
     f->held = calloc(2 * places + 1, sizeof(int64_t));
     if (!m->direct || !m->by_key || !m->key_ends || !m->by_state || !m->ends || !m->state || !f->held) return 0;
     m->trial = m->state + size;
@@ -331,7 +381,6 @@ static int prepare_room(Motion *m) {
     f->right = f->matrix + places * places;
     f->before = f->right + places * width;
     f->fresh = f->held + places;
-    m->total = f->before + m->dofs;
     return 1;
 }
 

@@ -46,7 +46,6 @@ typedef struct {
     Partial *by_state, *by_key;                 /* what is not always zero of the derivatives */
     int64_t *ends, *key_ends;                   /* where those of each row end in these lists */
     double *state, *trial, *other, *sum;        /* states x width each */
-    double *total;                              /* one row */
     int64_t onto;                               /* stages are added to the state one by one; else their sum is */
     int64_t ran;                                /* the program has run at this state and time */
     int64_t length, done;                       /* instructions of the program, and operations of all steps so far */
