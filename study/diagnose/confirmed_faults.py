@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.held_values import contradicted, held_coefficients, saying_so
 from study.diagnose.late_force import late_force
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import UNKNOWN, Diagnosis
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
@@ -37,65 +39,110 @@ def diagnose_accounted(
     without what the model alone told of its faults, and that stands where it leaves less. The first diagnosis stands
     where all is done that may be. Arguments as for :func:`study.diagnose.verdict.diagnose`.
     """
+    diagnosed = partial(diagnose_as_read, extra=extra, without=without, progress=progress)
     with work.limited_to(accounted.work_left):
-        return _with_faults(accounted, extra, without, progress)
+        return _with_faults(_Diagnoses(accounted, diagnosed))
 
 
-def _with_faults(
-    accounted: Accounted, extra: Sequence[Term], without: Sequence[str], progress: Progress | None
-) -> Diagnosed:
-    """The same, counted."""
-    made: list[Diagnosed] = []
+class _Diagnoses:
+    """Diagnoses of a record that is corrected for one set of faults or another; none is made twice."""
 
-    def found(one: Accounted) -> Diagnosed:
-        done = next((d for d in made if _of_the_same(d.accounted, one)), None)
-        diagnosis = (
-            diagnose_as_read(one.comparison, extra=extra, without=without, progress=progress)
-            if done is None
-            else _saying(done, one)
-        )
-        faults = one.faults
-        if diagnosis.comparison.model is not one.comparison.model:  # seen beside values that are let go
-            faults = still_seen(faults, diagnosis.comparison.fit, diagnosis.comparison.prepared)
-        made.append(Diagnosed(diagnosis, one, confirmed(faults, diagnosis)))
-        return made[-1]
+    def __init__(self, accounted: Accounted, diagnosed: Callable[..., Diagnosis]) -> None:
+        self.accounted, self._diagnosed = accounted, diagnosed
+        self._made: list[Diagnosed] = []
+        self._beside: list[tuple[Ranked, tuple[Fault, ...]]] = []
 
-    first = found(accounted)
+    def of(self, one: Accounted) -> Diagnosed:
+        """The diagnosis of a comparison, with those of its faults that show beside what is missing as well."""
+        done = next((d for d in self._made if _of_the_same(d.accounted, one)), None)
+        otherwise = self._is_a_fault if one is self.accounted else None
+        diagnosis = self._diagnosed(one.comparison, otherwise=otherwise) if done is None else _saying(done, one)
+        self._made.append(_with_confirmed(diagnosis, one))
+        return self._made[-1]
+
+    def faults_beside(self, answer: Ranked) -> tuple[Fault, ...]:
+        """The faults that the record as it was given shows beside the model with what is missing."""
+        asked = next((faults for row, faults in self._beside if row.fit is answer.fit), None)
+        if asked is None:
+            model = self.accounted.comparison.model
+            for entry in answer.entries:
+                model = model.with_term(entry)
+            asked = self.accounted.faults_beside(answer.fit, model)
+            self._beside.append((answer, asked))
+        return asked
+
+    def _is_a_fault(self, named: Diagnosis) -> bool:
+        """Whether the record, corrected for other faults, leaves no more than noise beside what is missing.
+
+        What is left beside what is named so far may be a fault that imitates a change of a coefficient, and is the
+        sooner asked for. Where nothing is named, what was corrected may have been the motion that is missing.
+        """
+        own = self.accounted.faults
+        if self.accounted.put_off or (named.answer is None and all(map(_plain, own))):
+            return False
+        try:
+            shown = [f for f in own if _plain(f)] if named.answer is None else self.faults_beside(named.answer)
+            if same(shown, own):
+                return False
+            one = self.accounted.corrected_for(shown)
+            diagnosis = self._diagnosed(one.comparison, otherwise=lambda _: True)
+        except StudyError:
+            return False
+        if diagnosis.answer is None or diagnosis.answer.prediction.above_noise > TOLERANCE:
+            return False
+        self._made.append(_with_confirmed(diagnosis, one))
+        return True
+
+
+def _with_faults(diagnoses: _Diagnoses) -> Diagnosed:
+    """The diagnosis that stands of those of the record as it is corrected for one set of faults or another."""
+    first = diagnoses.of(diagnoses.accounted)
     if work.is_done():
         return _cut_short(first)
-    if accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
-        accounted = accounted.with_all_faults()
-        first = found(accounted) if accounted.faults != first.accounted.faults else first
-    freed = _with_values_let_go(first, found)
+    if diagnoses.accounted.put_off and not first.diagnosis.changes:  # no change it was that looks like a fault
+        diagnoses.accounted = diagnoses.accounted.with_all_faults()
+        if diagnoses.accounted.faults != first.accounted.faults:
+            first = diagnoses.of(diagnoses.accounted)
+    freed = _with_values_let_go(first, diagnoses.of)
     if freed is not None:
-        first, accounted = freed, freed.accounted
-    removable = any(f.corrected and not _plain(f) for f in accounted.faults)
+        first, diagnoses.accounted = freed, freed.accounted
+    removable = any(f.corrected and not _plain(f) for f in diagnoses.accounted.faults)
     if removable and not work.is_done() and first.diagnosis.verdict == UNKNOWN:
-        other = found(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
-        instead, corrected = other.diagnosis.answer, first.diagnosis.comparison.prediction
-        # what leaves no less than the correction by itself is the fault by another name
-        if instead is not None and instead.response_error < corrected.error:
-            first = other
-    answer, faults = first.diagnosis.answer, first.accounted.faults
-    if answer is None:
-        return _cut_short(first) if work.is_done() else first
-    model = accounted.comparison.model
+        first = _without_what_was_corrected(first, diagnoses)
+    answer = first.diagnosis.answer
+    if answer is None or not _asks_again(first, answer, diagnoses.accounted):
+        return _cut_short(first) if answer is None and work.is_done() else first
+    return _cut_short(first) if work.is_done() else _corrected_anew(first, answer, diagnoses)
+
+
+def _without_what_was_corrected(first: Diagnosed, diagnoses: _Diagnoses) -> Diagnosed:
+    """The diagnosis of the record without what the model alone told of its faults, where something is missing there."""
+    accounted = diagnoses.accounted
+    other = diagnoses.of(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
+    instead, corrected = other.diagnosis.answer, first.diagnosis.comparison.prediction
+    # what leaves no less than the correction by itself is the fault by another name
+    return other if instead is not None and instead.response_error < corrected.error else first
+
+
+def _asks_again(first: Diagnosed, answer: Ranked, accounted: Accounted) -> bool:
+    """Whether the record may show other faults beside what is missing."""
+    faults = first.accounted.faults
     beside = len(faults) > 0 or first.accounted is not accounted
-    noisy = len(model.coordinates) > 1 and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
+    several = len(accounted.comparison.model.coordinates) > 1
+    noisy = several and answer.prediction.above_noise > TOLERANCE  # a force, as nothing else is left
     spiky = any(f.fault == SPIKES for f in faults)  # near the Nyquist frequency what is missing stands out as they do
-    if first.diagnosis.left <= TOLERANCE and not (noisy or spiky or (beside and len(answer.entries) > 1)):
-        return first
-    if work.is_done():
-        return _cut_short(first)
-    for entry in answer.entries:
-        model = model.with_term(entry)
+    return first.diagnosis.left > TOLERANCE or noisy or spiky or (beside and len(answer.entries) > 1)
+
+
+def _corrected_anew(first: Diagnosed, answer: Ranked, diagnoses: _Diagnoses) -> Diagnosed:
+    """The better of a diagnosis and that of the record corrected for faults that show beside what is missing."""
     try:
-        shown = accounted.faults_beside(answer.fit, model)
-        if same(shown, faults):
+        shown = diagnoses.faults_beside(answer)
+        if same(shown, first.accounted.faults):
             known = {(fault.fault, fault.channel) for fault in first.faults}
             said = tuple(f for f in shown if not f.corrected and (f.fault, f.channel) not in known)
             return replace(first, faults=(*first.faults, *said))
-        again = found(accounted.corrected_for(shown))
+        again = diagnoses.of(diagnoses.accounted.corrected_for(shown))
     except StudyError:
         return first
     better = again.diagnosis.answer is not None and again.diagnosis.answer.response_error < answer.response_error
@@ -106,6 +153,14 @@ def _cut_short(found: Diagnosed) -> Diagnosed:
     """What was found, said to be the best so far."""
     diagnosis = found.diagnosis
     return replace(found, diagnosis=replace(diagnosis, ended=diagnosis.ended or work.ENDED))
+
+
+def _with_confirmed(diagnosis: Diagnosis, one: Accounted) -> Diagnosed:
+    """A diagnosis of a comparison, with those of its faults that the record shows beside what is missing as well."""
+    faults = one.faults
+    if diagnosis.comparison.model is not one.comparison.model:  # seen beside values that are let go
+        faults = still_seen(faults, diagnosis.comparison.fit, diagnosis.comparison.prepared)
+    return Diagnosed(diagnosis, one, confirmed(faults, diagnosis))
 
 
 def _of_the_same(one: Accounted, other: Accounted) -> bool:

@@ -5,7 +5,7 @@ made straight or held between them leaves an error that grows with the square of
 samples a period make it look like relaxation, and a resonance above the Nyquist frequency is driven by nothing else.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -32,22 +32,23 @@ def diagnose_as_read(
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
+    otherwise: Callable[[Diagnosis], bool] | None = None,
 ) -> Diagnosis:
     """The diagnosis of :func:`diagnose_with_values_let_go`, unless another reading of the force explains it all.
 
     That reading must leave significantly less than the band-limited one and less than the best candidate does, and
     nothing may be missing with it: then the diagnosis is that of the record as it is read then, and its notes say so.
     """
-    diagnosed = partial(diagnose_with_values_let_go, extra=extra, without=without, progress=progress)
+    diagnosed = partial(
+        diagnose_with_values_let_go, extra=extra, without=without, progress=progress, otherwise=otherwise
+    )
     found = diagnosed(comparison)
     known = _sampled(comparison).record.between != BAND_LIMITED  # by what it does to the response
     if known or found.verdict == NOTHING or comparison.fit.restarts or not comparison.fit.keys:
         return found
     best = min((row.response_error for row in found.candidates), default=comparison.prediction.error)
     for prepared in _better_read(comparison, min(best, comparison.prediction.error)):
-        other = diagnose_with_values_let_go(
-            compare(comparison.model, prepared), extra=extra, without=without, progress=progress
-        )
+        other = diagnosed(compare(comparison.model, prepared))
         if other.verdict == NOTHING:
             return other
     return found

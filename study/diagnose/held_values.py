@@ -4,7 +4,7 @@ A spring constant of a data sheet, or the damping of another day, that is wrong 
 of the library imitate: friction and a damping that grows with displacement stand for too little damping.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -32,6 +32,7 @@ def diagnose_with_values_let_go(
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
+    otherwise: Callable[[Diagnosis], bool] | None = None,
 ) -> Diagnosis:
     """The diagnosis of :func:`study.diagnose.verdict.diagnose`, with values let go that stand for an effect it names.
 
@@ -39,12 +40,12 @@ def diagnose_with_values_let_go(
     leaves no more. Those stay held that the fit then does not contradict. The diagnosis is that of the model with the
     others fitted, and its notes say so.
     """
-    found = diagnose(comparison, extra=extra, without=without, progress=progress)
+    diagnosed = partial(diagnose, extra=extra, without=without, progress=progress, otherwise=otherwise)
+    found = diagnosed(comparison)
     keys = held_coefficients(comparison)
     best = next(iter([*found.sets, *found.candidates]), None)
     if found.verdict == NOTHING or best is None or not keys or not _stand_in(keys, best, comparison):
         return found
-    diagnosed = partial(diagnose, extra=extra, without=without, progress=progress)
     try:
         freed = diagnosed(_let_go(comparison, keys))
         wrong = contradicted(keys, freed, comparison)

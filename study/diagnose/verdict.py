@@ -1,7 +1,7 @@
 """The whole diagnosis: try every candidate, and say what the record bears - no less, no more."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -110,20 +110,23 @@ def diagnose(
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
+    otherwise: Callable[[Diagnosis], bool] | None = None,
 ) -> Diagnosis:
     """Find the effects that a model lacks, and their places.
 
     What the comparison's model held is held, the rest is fitted. ``extra`` are the user's own candidates, ``without``
-    terms of the library to leave out; ``progress`` is called after each candidate that was fitted. Where all is done
-    that may be, what is not yet asked is not asked any more, and that is said.
+    terms of the library to leave out; ``progress`` is called after each candidate that was fitted. Where ``otherwise``
+    says of what is found without a change of a coefficient that what is left beside it has another reason, no change
+    is asked for. Where all is done that may be, what is not yet asked is not asked any more, and that is said.
     """
     with work.limited_to(work.most_for(len(comparison.prepared.record))):
-        return _diagnosed(comparison, extra, without, progress)
+        return _diagnosed(comparison, extra, without, progress, otherwise)
 
 
 def _diagnosed(
-    comparison: Comparison, extra: Sequence[Term], without: Sequence[str], progress: Progress | None
-) -> Diagnosis:
+    comparison: Comparison, extra: Sequence[Term], without: Sequence[str], progress: Progress | None,
+    otherwise: Callable[[Diagnosis], bool] | None,
+) -> Diagnosis:  # fmt: skip
     """The same, counted."""
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without, comparison.prepared.record.rotations)
@@ -138,7 +141,7 @@ def _diagnosed(
         elsewhere = 0 if other is None else len(changes.shares)
     del changes  # and the record laid out anew: of a long one it takes as much as all that follows
     if (freed := _freed(comparison, base, tried)) is not None:
-        return _diagnosed(freed, extra, without, progress)
+        return _diagnosed(freed, extra, without, progress, otherwise)
     found = _diagnosis(comparison, base, tried, entries, progress, elsewhere)
     if ended:
         return replace(found, ended=found.ended or ended)
@@ -155,6 +158,8 @@ def _diagnosed(
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
     changes = promised_changes(named[0].fit, comparison.prepared, own)
     if changes is None or not varying_candidates.explains_more(changes, named[0].names, progress):
+        return found
+    if otherwise is not None and otherwise(found):
         return found
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     if other is None or not other.changes:

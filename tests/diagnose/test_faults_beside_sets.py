@@ -290,3 +290,69 @@ def test_with_another_fault_it_is(monkeypatch: pytest.MonkeyPatch):
     found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.02), (SET, 0.01, 0.05), (SET, 0.01, 0.01))
     assert made == 3
     assert [fault.value for fault in found.accounted.faults] == [1.1]
+
+
+def found_in_stead(
+    monkeypatch: pytest.MonkeyPatch, record: Corrected, named: tuple[str, ...], above_noise: float
+) -> tuple[bool | None, Any, int]:
+    """Whether a fault stands for the change that the record asks for, what comes out, and how many diagnoses were made.
+
+    ``named`` is what is found before a change is asked for; beside that of other corrections so much is left.
+    """
+    told: list[bool] = []
+    made: list[Any] = []
+
+    def answer_of(names: tuple[str, ...], error: float, above: float) -> Any:
+        prediction = SimpleNamespace(above_noise=above)
+        return SimpleNamespace(entries=names, fit=names, response_error=error, prediction=prediction)
+
+    def diagnosis(comparison: Any, *, otherwise: Any, **_: Any) -> Any:
+        made.append(comparison)
+        if len(made) > 1:
+            return Found(answer_of(SET, 0.02 + above_noise, above_noise), 0.0, SEVERAL, False, comparison)
+        answer = answer_of(named, 0.05, 0.04) if named else None
+        before = Found(answer, 0.04, SEVERAL if named else UNKNOWN, False, comparison)
+        told.append(otherwise(before))
+        changed = answer_of((*named, "linear_stiffness_over_time"), 0.03, 0.0)
+        return before if told[-1] else Found(changed, 0.0, SEVERAL, True, comparison)
+
+    monkeypatch.setattr(confirmed_faults, "diagnose_as_read", diagnosis)
+    monkeypatch.setattr(confirmed_faults, "confirmed", lambda faults, _: tuple(faults))
+    monkeypatch.setattr(confirmed_faults, "held_coefficients", lambda _: ())
+    found = diagnose_accounted(record)  # type: ignore[arg-type]
+    return told[0], found, len(made)
+
+
+@pytest.mark.parametrize("named", [(), ONE])
+def test_a_fault_that_explains_all_is_asked_for_before_a_change(monkeypatch: pytest.MonkeyPatch, named: Any):
+    """The diagnosis of the record as it is corrected then is made once."""
+    shown = (delay(1.0),) if named else ()
+    instead, found, made = found_in_stead(monkeypatch, Corrected([OFFSET], beside=shown), named, 0.0)
+    assert instead
+    assert made == 2
+    assert found.diagnosis.answer.response_error == 0.02
+    assert found.accounted.faults == shown
+
+
+def test_a_change_is_asked_for_where_no_fault_explains_all(monkeypatch: pytest.MonkeyPatch):
+    record = Corrected([OFFSET], beside=[delay(1.0)])
+    instead, found, _ = found_in_stead(monkeypatch, record, ONE, 0.02)
+    assert not instead
+    assert found.diagnosis.changes
+
+
+@pytest.mark.parametrize(
+    ("faults", "beside", "named"),
+    [
+        ([OFFSET], [OFFSET], ONE),  # the same faults show beside what is named
+        ([KNOWN], [], ()),  # nothing is named, and what was corrected is known
+        ([OFFSET], StudyError("no finite motion"), ONE),
+    ],
+)
+def test_a_change_is_asked_for_at_once_where_no_other_fault_shows(
+    monkeypatch: pytest.MonkeyPatch, faults: list[Fault], beside: Any, named: Any
+):
+    instead, found, made = found_in_stead(monkeypatch, Corrected(faults, beside), named, 0.0)
+    assert not instead
+    assert made == 1
+    assert found.diagnosis.changes

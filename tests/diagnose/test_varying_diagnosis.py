@@ -125,6 +125,29 @@ def test_a_change_that_gained_stands_where_asking_for_all_at_once_comes_to_no_en
     assert stands == Said(True, "at its limit")
 
 
+@pytest.mark.parametrize("another", [True, False])
+def test_a_change_is_asked_for_unless_what_is_left_has_another_reason(monkeypatch: pytest.MonkeyPatch, another: bool):
+    fit = SimpleNamespace(model=SimpleNamespace(terms=()))
+    record = SimpleNamespace(rotations=())
+    comparison: Any = SimpleNamespace(fit=fit, prepared=SimpleNamespace(record=record))
+    named = SimpleNamespace(fit=fit, names=(), prediction=SimpleNamespace(above_noise=1.0))
+    found = SimpleNamespace(verdict=MISSING, sets=(named,), candidates=(), changes=False)
+    changed = SimpleNamespace(changes=True)
+    for name, returned in (
+        ("search_base", None), ("candidate_entries", []), ("_freed", None), ("_diagnosis", found),
+        ("_where_none_explains_it", []), ("_changing", changed),
+    ):  # fmt: skip
+        monkeypatch.setattr(verdict, name, lambda *_, r=returned, **__: r)
+    monkeypatch.setattr(verdict, "promised_changes", lambda *_: SimpleNamespace(shares=()))
+    monkeypatch.setattr(verdict.candidates, "try_all", lambda *_: [])
+    monkeypatch.setattr(verdict.varying_candidates, "first_of_all", lambda *_: False)
+    monkeypatch.setattr(verdict.varying_candidates, "explains_more", lambda *_: True)
+    asked: list[Any] = []
+    stands = verdict._diagnosed(comparison, (), (), None, lambda one: bool(asked.append(one)) or another)
+    assert asked == [found]
+    assert stands is (found if another else changed)
+
+
 def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():
     trial = make_varying_trial("drift", 4, of="linear_stiffness", change=-0.3, noise=0.01)
     found = compare_records([trial.record], trial.believed)
