@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
+from study.compare.comparison import Comparison
 from study.diagnose.candidates import Progress
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.held_values import contradicted, held_coefficients, saying_so
 from study.diagnose.late_force import late_force
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import UNKNOWN, Diagnosis
+from study.diagnose.verdict import UNKNOWN, Diagnosis, Otherwise
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
 from study.faults.fault import SPIKES, Fault
@@ -39,7 +39,10 @@ def diagnose_accounted(
     without what the model alone told of its faults, and that stands where it leaves less. The first diagnosis stands
     where all is done that may be. Arguments as for :func:`study.diagnose.verdict.diagnose`.
     """
-    diagnosed = partial(diagnose_as_read, extra=extra, without=without, progress=progress)
+
+    def diagnosed(comparison: Comparison, otherwise: Otherwise | None) -> Diagnosis:
+        return diagnose_as_read(comparison, extra=extra, without=without, progress=progress, otherwise=otherwise)
+
     with work.limited_to(accounted.work_left):
         return _with_faults(_Diagnoses(accounted, diagnosed))
 
@@ -47,7 +50,7 @@ def diagnose_accounted(
 class _Diagnoses:
     """Diagnoses of a record that is corrected for one set of faults or another; none is made twice."""
 
-    def __init__(self, accounted: Accounted, diagnosed: Callable[..., Diagnosis]) -> None:
+    def __init__(self, accounted: Accounted, diagnosed: Callable[[Comparison, Otherwise | None], Diagnosis]) -> None:
         self.accounted, self._diagnosed = accounted, diagnosed
         self._made: list[Diagnosed] = []
         self._beside: list[tuple[Ranked, tuple[Fault, ...]]] = []
@@ -56,7 +59,7 @@ class _Diagnoses:
         """The diagnosis of a comparison, with those of its faults that show beside what is missing as well."""
         done = next((d for d in self._made if _of_the_same(d.accounted, one)), None)
         otherwise = self._is_a_fault if one is self.accounted else None
-        diagnosis = self._diagnosed(one.comparison, otherwise=otherwise) if done is None else _saying(done, one)
+        diagnosis = self._diagnosed(one.comparison, otherwise) if done is None else _saying(done, one)
         self._made.append(_with_confirmed(diagnosis, one))
         return self._made[-1]
 
@@ -85,7 +88,7 @@ class _Diagnoses:
             if same(shown, own):
                 return False
             one = self.accounted.corrected_for(shown)
-            diagnosis = self._diagnosed(one.comparison, otherwise=lambda _: True)
+            diagnosis = self._diagnosed(one.comparison, lambda _: True)
         except StudyError:
             return False
         if diagnosis.answer is None or diagnosis.answer.prediction.above_noise > TOLERANCE:

@@ -5,7 +5,7 @@ made straight or held between them leaves an error that grows with the square of
 samples a period make it look like relaxation, and a resonance above the Nyquist frequency is driven by nothing else.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.prediction import predict
 from study.diagnose.candidates import Progress
 from study.diagnose.held_values import diagnose_with_values_let_go
-from study.diagnose.verdict import NOTHING, Diagnosis, search_part
+from study.diagnose.verdict import NOTHING, Diagnosis, Otherwise, search_part
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
@@ -32,7 +32,7 @@ def diagnose_as_read(
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
-    otherwise: Callable[[Diagnosis], bool] | None = None,
+    otherwise: Otherwise | None = None,
 ) -> Diagnosis:
     """The diagnosis of :func:`diagnose_with_values_let_go`, unless another reading of the force explains it all.
 

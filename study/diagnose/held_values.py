@@ -4,7 +4,7 @@ A spring constant of a data sheet, or the damping of another day, that is wrong 
 of the library imitate: friction and a damping that grows with displacement stand for too little damping.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -14,7 +14,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.prediction import predict
 from study.diagnose.candidates import Progress
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import NOTHING, Diagnosis, diagnose
+from study.diagnose.verdict import NOTHING, Diagnosis, Otherwise, diagnose
 from study.equations.terms import Term
 from study.identify.time_domain.part_fit import fit_part, run_and_slopes, uncertainty
 from study.identify.time_domain.rivals import larger
@@ -32,7 +32,7 @@ def diagnose_with_values_let_go(
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
-    otherwise: Callable[[Diagnosis], bool] | None = None,
+    otherwise: Otherwise | None = None,
 ) -> Diagnosis:
     """The diagnosis of :func:`study.diagnose.verdict.diagnose`, with values let go that stand for an effect it names.
 

@@ -104,13 +104,16 @@ class Diagnosis:
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 
+Otherwise = Callable[[Diagnosis], bool]  # whether what is left beside what is found has another reason than a change
+
+
 def diagnose(
     comparison: Comparison,
     *,
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Progress | None = None,
-    otherwise: Callable[[Diagnosis], bool] | None = None,
+    otherwise: Otherwise | None = None,
 ) -> Diagnosis:
     """Find the effects that a model lacks, and their places.
 
@@ -125,7 +128,7 @@ def diagnose(
 
 def _diagnosed(
     comparison: Comparison, extra: Sequence[Term], without: Sequence[str], progress: Progress | None,
-    otherwise: Callable[[Diagnosis], bool] | None,
+    otherwise: Otherwise | None,
 ) -> Diagnosis:  # fmt: skip
     """The same, counted."""
     base = search_base(comparison)
