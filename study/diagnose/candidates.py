@@ -6,7 +6,8 @@ at which of them which effects are worth a fit (``shape_search``).
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +42,7 @@ class FittedCandidate:
     entries: tuple[ModelTerm, ...]  # the effects and their places
     fit: FreeRunFit  # the model with them, fitted on the fitting part
     prediction: Prediction  # its free run along the judging part
+    settled: bool = field(default=False, kw_only=True)  # fitted as it would be if it were added
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -267,12 +269,13 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
     """Candidates fitted to the whole fitting part and with enough steps, as they would be if they were added."""
 
     def settle(candidate: FittedCandidate) -> FittedCandidate:
-        try:
-            fit = finished(with_all_knots(candidate.fit, prepared), prepared)
-            entries = tuple(_as_in(entry, fit) for entry in candidate.entries)
-            return judged_candidate(entries, fit, prepared) or candidate
-        except StudyError:
+        if candidate.settled:
             return candidate
+        found = None
+        with suppress(StudyError):
+            fit = finished(with_all_knots(candidate.fit, prepared), prepared)
+            found = judged_candidate(tuple(_as_in(entry, fit) for entry in candidate.entries), fit, prepared)
+        return replace(found or candidate, settled=True)
 
     return list(side_by_side(settle, candidates, lambda candidate: candidate.term.effort))
 

@@ -145,6 +145,8 @@ def _corrected_anew(first: Diagnosed, answer: Ranked, diagnoses: _Diagnoses) -> 
             known = {(fault.fault, fault.channel) for fault in first.faults}
             said = tuple(f for f in shown if not f.corrected and (f.fault, f.channel) not in known)
             return replace(first, faults=(*first.faults, *said))
+        if work.is_done():
+            return _cut_short(first)
         again = diagnoses.of(diagnoses.accounted.corrected_for(shown))
     except StudyError:
         return first

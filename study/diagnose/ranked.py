@@ -127,7 +127,7 @@ def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     return Ranked(
         candidate.entries, fit, candidate.prediction, effects,
         gain=statistics.gain(before.residual, candidate.prediction.residual), p_value=1.0,
-        held_out=held_out(fit, candidate.prediction, jacobian, prepared),
+        held_out=held_out(fit, candidate.prediction, jacobian, prepared), settled=candidate.settled,
     )  # fmt: skip
 
 

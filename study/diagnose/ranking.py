@@ -24,13 +24,17 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: i
 
     Residuals are compared as the noise of the record allows: filtered with the autoregressive model of what the best
     candidate leaves, which makes noise white. ``asked`` is how many effects at places were asked for, those that were
-    not worth a fit among them; as many as there are candidates if left out.
+    not worth a fit among them; as many as there are candidates if left out. Those that were ranked beside others by the
+    same comparison are not measured again.
     """
     if not candidates:
         return []
     before, asked = comparison.prediction, asked or len(candidates)
 
-    rows = list(side_by_side(lambda candidate: ranked_candidate(candidate, before), candidates))
+    def measured(candidate: FittedCandidate) -> Ranked:
+        return candidate if isinstance(candidate, Ranked) else ranked_candidate(candidate, before)
+
+    rows = list(side_by_side(measured, candidates))
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     outputs, fit = before.prepared.outputs, rows[0].fit
     noise = noise_left(fit.residual, len(fit.outputs))

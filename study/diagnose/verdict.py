@@ -156,13 +156,15 @@ def _diagnosed(
         return found
     if named[0].prediction.above_noise <= TOLERANCE:
         return found
+    # what changes may be the smaller part of what is missing, and seen beside the larger one alone
+    changes = None if work.is_done() else promised_changes(named[0].fit, comparison.prepared, own)
+    if changes is not None and not varying_candidates.explains_more(changes, named[0].names, progress):
+        return found
+    if changes is not None and otherwise is not None and otherwise(found):
+        return found
     if work.is_done():
         return replace(found, ended=found.ended or f"{work.ENDED}, before changes were asked for")
-    # what changes may be the smaller part of what is missing, and seen beside the larger one alone
-    changes = promised_changes(named[0].fit, comparison.prepared, own)
-    if changes is None or not varying_candidates.explains_more(changes, named[0].names, progress):
-        return found
-    if otherwise is not None and otherwise(found):
+    if changes is None:
         return found
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     if other is None or not other.changes:
@@ -322,7 +324,9 @@ def _decide(
     )
     deeper = [search.tried.get(frozenset(c.names), c) for c in tried]
     if any(c.power - d.power > (TOLERANCE * base.prepared.spread) ** 2 for c, d in zip(tried, deeper, strict=True)):
-        rows = rank(with_best_settled(deeper, comparison.prepared), comparison, asked)
+        ranked = {row.name: row for row in rows}
+        again = [ranked[c.name] if d is c else d for c, d in zip(tried, deeper, strict=True)]
+        rows = rank(with_best_settled(again, comparison.prepared), comparison, asked)
         return _decide(
             rows, deeper, entries, base, comparison, asked, progress, beside=beside, from_above=from_above,
             search=search,
