@@ -260,9 +260,12 @@ def judged_candidate(
 
 
 def with_best_settled(tried: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
-    """The best candidates fitted as they would be if they were added, then the others."""
-    ordered = sorted(tried, key=_worse)
-    return all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
+    """The best candidates fitted as they would be if they were added, then the others.
+
+    The best alone where all work is done that may be.
+    """
+    ordered, most = sorted(tried, key=_worse), 1 if work.is_done() else SETTLED
+    return all_settled(ordered[:most], prepared) + ordered[most:]
 
 
 def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
