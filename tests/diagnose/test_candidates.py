@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from study.diagnose import candidates, verdict
-from study.diagnose.candidates import MOST_PROMISING, try_all
+from study.diagnose.candidates import MOST_PROMISING, SETTLED, FittedCandidate, try_all, with_best_settled
+from study.diagnose.ranking import rank
 from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY
 from study.identify.time_domain.shape_search import Start
@@ -62,3 +63,43 @@ def test_the_search_for_faults_leaves_half_of_the_work_to_what_is_missing(monkey
     found = compare_records([trial.record], trial.believed)
     assert limits == [work.most_for(len(found.given.record)) / 2.0]
     assert found.work_left >= limits[0]
+
+
+@pytest.mark.parametrize(("done", "settled"), [(False, SETTLED), (True, 1)])
+def test_the_best_are_settled_once_and_where_all_work_is_done_the_best_alone(
+    monkeypatch: pytest.MonkeyPatch, done: bool, settled: int
+) -> None:
+    errors = [0.5, 0.3, 0.1, 0.4, 0.2, 0.6]
+    made: list[float] = []
+
+    def finished(fit: Any, _: Any) -> Any:
+        made.append(fit)
+        return fit
+
+    def judged(_: Any, fit: Any, __: Any) -> FittedCandidate:
+        return FittedCandidate((), fit, SimpleNamespace(error=fit))  # type: ignore[arg-type]
+
+    prepared: Any = None
+    monkeypatch.setattr(candidates, "with_all_knots", lambda fit, _: fit)
+    monkeypatch.setattr(candidates, "finished", finished)
+    monkeypatch.setattr(candidates, "judged_candidate", judged)
+    monkeypatch.setattr(FittedCandidate, "unphysical", "")
+    monkeypatch.setattr(FittedCandidate, "term", SimpleNamespace(effort=1.0))
+    with work.limited_to(0 if done else 1):
+        once = with_best_settled([judged((), error, prepared) for error in errors], prepared)
+        again = with_best_settled(once, prepared)
+    assert [c.prediction.error for c in once] == sorted(errors)
+    assert sorted(made) == sorted(errors)[:settled]
+    assert again == once
+
+
+def test_what_was_ranked_is_not_measured_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial = make_trial(6, ("cubic_stiffness",), 1e-4)
+    comparison = compare_records([trial.record], trial.believed).comparison
+    base = verdict.search_base(comparison)
+    tried = [candidates.attempt(free(LIBRARY[name]), base) for name in ("cubic_stiffness", "quadratic_damping")]
+    rows = rank([c for c in tried if c is not None], comparison)
+    monkeypatch.setattr("study.diagnose.ranking.ranked_candidate", None)
+    again = rank(rows[::-1], comparison)
+    assert [row.name for row in again] == [row.name for row in rows] == ["cubic_stiffness", "quadratic_damping"]
+    assert [(r.p_value, r.gain, r.distance) for r in again] == [(r.p_value, r.gain, r.distance) for r in rows]

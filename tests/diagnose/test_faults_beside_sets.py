@@ -356,3 +356,19 @@ def test_a_change_is_asked_for_at_once_where_no_other_fault_shows(
     assert not instead
     assert made == 1
     assert found.diagnosis.changes
+
+
+def test_no_diagnosis_is_begun_where_all_work_is_done(monkeypatch: pytest.MonkeyPatch):
+    """Beside what is missing other faults show, but looking for these has taken what work was left."""
+
+    class AtItsEnd(Corrected):
+        def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
+            work.add(10)
+            return super().faults_beside(_fit, model)
+
+    record = AtItsEnd([OFFSET], beside=[delay(1.0)])
+    record.work_left = 10
+    found, made = diagnosed(monkeypatch, record, (SET, 0.01, 0.05))
+    assert made == 1
+    assert found.accounted is record
+    assert found.diagnosis.ended == work.ENDED

@@ -1,5 +1,6 @@
 """Coefficients that vary, found: along time, with a channel, in a step; and not where something else is missing."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from study.equations.model_file import parse_model
 from study.identify.time_domain.promised_changes import promised_changes
 from study.records.record import Record
 from study.records.record_layout import Layout
+from study.support import work
 from study.support.numbers import percent
 from study.trials.draw import make_trial
 from study.trials.varying import make_varying_trial
@@ -125,17 +127,26 @@ def test_a_change_that_gained_stands_where_asking_for_all_at_once_comes_to_no_en
     assert stands == Said(True, "at its limit")
 
 
-@pytest.mark.parametrize("another", [True, False])
-def test_a_change_is_asked_for_unless_what_is_left_has_another_reason(monkeypatch: pytest.MonkeyPatch, another: bool):
-    fit = SimpleNamespace(model=SimpleNamespace(terms=()))
-    record = SimpleNamespace(rotations=())
-    comparison: Any = SimpleNamespace(fit=fit, prepared=SimpleNamespace(record=record))
-    named = SimpleNamespace(fit=fit, names=(), prediction=SimpleNamespace(above_noise=1.0))
-    found = SimpleNamespace(verdict=MISSING, sets=(named,), candidates=(), changes=False)
-    changed = SimpleNamespace(changes=True)
+@dataclass(frozen=True)
+class Named:
+    """A diagnosis that names something, without a change of a coefficient or with one."""
+
+    changes: bool
+    ended: str = ""
+    verdict: str = MISSING
+    sets: tuple[Any, ...] = (SimpleNamespace(fit=None, names=(), prediction=SimpleNamespace(above_noise=1.0)),)
+    candidates: tuple[Any, ...] = ()
+
+
+def diagnosed_unless(monkeypatch: pytest.MonkeyPatch, another: Callable[[Any], bool]) -> tuple[Any, list[Any]]:
+    """What stands, and of what it was asked whether what is left has another reason, in ten operations."""
+    comparison: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=SimpleNamespace(terms=())),
+        prepared=SimpleNamespace(record=SimpleNamespace(rotations=())),
+    )
     for name, returned in (
-        ("search_base", None), ("candidate_entries", []), ("_freed", None), ("_diagnosis", found),
-        ("_where_none_explains_it", []), ("_changing", changed),
+        ("search_base", None), ("candidate_entries", []), ("_freed", None), ("_diagnosis", Named(False)),
+        ("_where_none_explains_it", []), ("_changing", Named(True)),
     ):  # fmt: skip
         monkeypatch.setattr(verdict, name, lambda *_, r=returned, **__: r)
     monkeypatch.setattr(verdict, "promised_changes", lambda *_: SimpleNamespace(shares=()))
@@ -143,9 +154,24 @@ def test_a_change_is_asked_for_unless_what_is_left_has_another_reason(monkeypatc
     monkeypatch.setattr(verdict.varying_candidates, "first_of_all", lambda *_: False)
     monkeypatch.setattr(verdict.varying_candidates, "explains_more", lambda *_: True)
     asked: list[Any] = []
-    stands = verdict._diagnosed(comparison, (), (), None, lambda one: bool(asked.append(one)) or another)
-    assert asked == [found]
-    assert stands is (found if another else changed)
+    with work.limited_to(10):
+        stands = verdict._diagnosed(comparison, (), (), None, lambda one: bool(asked.append(one)) or another(one))
+    return stands, asked
+
+
+@pytest.mark.parametrize("another", [True, False])
+def test_a_change_is_asked_for_unless_what_is_left_has_another_reason(monkeypatch: pytest.MonkeyPatch, another: bool):
+    stands, asked = diagnosed_unless(monkeypatch, lambda _: another)
+    assert asked == [Named(False)]
+    assert stands == Named(not another)
+
+
+def test_no_change_is_asked_for_where_all_work_is_done(monkeypatch: pytest.MonkeyPatch):
+    """Asking for another reason has taken what was left of it."""
+    stands, asked = diagnosed_unless(monkeypatch, lambda _: bool(work.add(10)))
+    assert asked
+    assert not stands.changes
+    assert stands.ended == f"{work.ENDED}, before changes were asked for"
 
 
 def test_where_a_coefficient_seems_to_change_faults_that_look_like_it_are_put_off():
