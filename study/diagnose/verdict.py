@@ -156,16 +156,17 @@ def _diagnosed(
         return found
     if named[0].prediction.above_noise <= TOLERANCE:
         return found
+    cut_short = replace(found, ended=found.ended or f"{work.ENDED}, before changes were asked for")
+    if work.is_done():
+        return cut_short
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
-    changes = None if work.is_done() else promised_changes(named[0].fit, comparison.prepared, own)
-    if changes is not None and not varying_candidates.explains_more(changes, named[0].names, progress):
+    changes = promised_changes(named[0].fit, comparison.prepared, own)
+    if changes is None or not varying_candidates.explains_more(changes, named[0].names, progress):
         return found
-    if changes is not None and otherwise is not None and otherwise(found):
+    if otherwise is not None and otherwise(found):
         return found
     if work.is_done():
-        return replace(found, ended=found.ended or f"{work.ENDED}, before changes were asked for")
-    if changes is None:
-        return found
+        return cut_short
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
     if other is None or not other.changes:
         return found if other is None else replace(found, ended=other.ended)

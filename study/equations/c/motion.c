@@ -212,15 +212,12 @@ void step_on(Motion *m, double time, double h, const double *drive, int64_t colu
 
 void row_of(const Motion *m, int64_t row, const double *at, double *to) {
     const double *const *direct = m->direct + row * m->width;
-    const Partial *key = m->by_key + m->key_ends[row], *last_key = m->by_key + m->key_ends[row + 1];
     const Partial *state = m->by_state + m->ends[row], *last_state = m->by_state + m->ends[row + 1];
-    memset(to, 0, (size_t)m->columns * sizeof(double));
-    for (; key < last_key; key++) to[key->of] = *key->from;
+    for (int64_t c = 0; c < m->columns; c++) to[c] = *direct[c];
     for (; state < last_state; state++) {
         double by = *state->from;
         for (int64_t c = 1; c < m->columns; c++) to[c] += by * at[state->of * m->width + c];
     }
-    to[0] = *direct[0];
 }
 
 void run_here(Motion *m, double time, const double *drive) {
@@ -321,8 +318,6 @@ static int64_t along_adams(
 void forget_motion(Motion *m) {
     forget_program(&m->program);
     free(m->direct);
-    free(m->by_key);
-    free(m->key_ends);
     free(m->by_state);
     free(m->ends);
     free(m->state);
@@ -335,8 +330,8 @@ void forget_motion(Motion *m) {
  */
 static void find_derivatives(Motion *m, const int64_t *slots, int64_t slot_width, int64_t inputs, int64_t first) {
     const double *r = m->program.r;
-    int64_t states = 0, keys = 0;
-    m->ends[0] = m->key_ends[0] = 0;
+    int64_t states = 0;
+    m->ends[0] = 0;
     for (int64_t row = 0; row < m->rows; row++, slots += slot_width) {
         const double **direct = m->direct + row * m->width;
         direct[0] = r + slots[0];
@@ -346,13 +341,10 @@ static void find_derivatives(Motion *m, const int64_t *slots, int64_t slot_width
             if (at >= inputs && at < first && r[at] == 0.0) continue;
             if (i <= m->states)
                 m->by_state[states++] = (Partial){i - 1, r + at};
-            else if (key < m->columns) {
+            else if (key < m->columns)
                 direct[key] = r + at;
-                m->by_key[keys++] = (Partial){key, r + at};
-            }
         }
         m->ends[row + 1] = states;
-        m->key_ends[row + 1] = keys;
     }
 }
 
@@ -362,13 +354,11 @@ static int prepare_room(Motion *m) {
     size_t states = (size_t)m->states, rows = (size_t)m->rows, width = (size_t)m->width, size = states * width;
     size_t places = (size_t)f->places, of_friction = places * (places + width + 3) + 2 * size + (size_t)m->dofs;
     m->direct = malloc((rows * width + 1) * sizeof(double *));
-    m->by_key = malloc((rows * width + 1) * sizeof(Partial));
-    m->key_ends = malloc((rows + 1) * sizeof(int64_t));
     m->by_state = malloc((rows * states + 1) * sizeof(Partial));
     m->ends = malloc((rows + 1) * sizeof(int64_t));
     m->state = calloc(4 * size + 4 * states + 3 * (size_t)m->drives + of_friction, sizeof(double));
     f->held = calloc(2 * places + 1, sizeof(int64_t));
-    if (!m->direct || !m->by_key || !m->key_ends || !m->by_state || !m->ends || !m->state || !f->held) return 0;
+    if (!m->direct || !m->by_state || !m->ends || !m->state || !f->held) return 0;
     m->trial = m->state + size;
     m->sum = m->trial + size;
     m->other = m->sum + size; /* and four rows of one column more, for the slopes of an Adams method */

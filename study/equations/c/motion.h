@@ -17,7 +17,7 @@
 #include "program.h"
 
 typedef struct {
-    int64_t of;         /* state, or column of a key, by which a row is differentiated */
+    int64_t of;         /* state by which a row is differentiated */
     const double *from; /* register of the partial derivative */
 } Partial;
 
@@ -43,8 +43,8 @@ typedef struct {
     Program program;
     int64_t dofs, states, columns, width, drives, rows;
     const double **direct;                      /* value, derivatives by keys, zeros: `width` registers a row */
-    Partial *by_state, *by_key;                 /* what is not always zero of the derivatives */
-    int64_t *ends, *key_ends;                   /* where those of each row end in these lists */
+    Partial *by_state;                          /* what is not always zero of the derivatives by states */
+    int64_t *ends;                              /* where those of each row end in this list */
     double *state, *trial, *other, *sum;        /* states x width each */
     int64_t onto;                               /* stages are added to the state one by one; else their sum is */
     int64_t ran;                                /* the program has run at this state and time */
