@@ -12,7 +12,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import UNKNOWN, Diagnosis, Otherwise
 from study.equations.terms import Term
 from study.faults.accounting import Accounted, still_seen
-from study.faults.fault import SPIKES, Fault
+from study.faults.fault import SPIKES, Fault, same
 from study.support import statistics, work
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE, K
@@ -212,14 +212,6 @@ def _with_values_let_go(first: Diagnosed, found: Callable[[Accounted], Diagnosed
 def _plain(fault: Fault) -> bool:
     """Whether a fault shows in the record itself, or is known, whatever model is held beside it."""
     return fault.held or fault.lost is not None
-
-
-def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:
-    """Whether two searches found the same faults to correct, with values that their errors cannot tell apart."""
-    mine, theirs = ({(f.fault, f.channel): f for f in faults if f.corrected} for faults in (one, other))
-    return set(mine) == set(theirs) and all(
-        abs(f.value - theirs[key].value) <= K * (f.error**2 + theirs[key].error ** 2) ** 0.5 for key, f in mine.items()
-    )
 
 
 def confirmed(faults: Sequence[Fault], diagnosis: Diagnosis) -> tuple[Fault, ...]:

@@ -263,8 +263,11 @@ def _beneath_too(
     """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
     The second begins with the model fitted to the responses without what may lie beneath them: their slowest lines, or
-    their means where a fit is lost.
+    their means where a fit is lost. Where the plain one leaves noise alone there is nothing that it could find.
     """
+    left = leftover(plain.fit, corrected(prepared, plain.faults))
+    if left is not None and left.prediction.above_noise <= TOLERANCE:
+        return plain
     first = corrected(prepared, faults)
     drifting, offset = ([channel for name, channel in asked if name == one] for one in (DRIFT, OFFSET))
     begin = [fault for channel in drifting if (fault := slow_response(first, channel, len(asked))) is not None]
@@ -283,7 +286,7 @@ def _beneath_too(
     none = np.zeros(len(prepared.record))
     columns = np.stack([under.get(str(sensor), none) for sensor in begun.outputs.sensors], axis=1)
     whole = replace(begun, residual=begun.residual + begun.outputs.stacked(columns[slice(*begun.span)]))  # as it is
-    other = search_faults(prepared, whole, faults, asked)
+    other = search_faults(prepared, whole, faults, asked, before=plain)
     begun_with = any(fault.fault in (DRIFT, OFFSET) for fault in other.faults)
     return other if begun_with and _leaves_less(prepared, plain, other, "fit") else plain
 
@@ -362,7 +365,7 @@ def _begun_late(
     if left is None:
         return plain
     explained = math.nan if without is None else gained(without, left).explained
-    other = search_faults(prepared, following, (*faults, replace(late, explained=explained)), asked)
+    other = search_faults(prepared, following, (*faults, replace(late, explained=explained)), asked, before=plain)
     kept = any(fault.fault == DELAY for fault in other.faults)
     better = kept and all(_leaves_less(prepared, plain, other, which) for which in ("fit", "rich"))
     return other if better else plain

@@ -1,7 +1,7 @@
 """A fault of the measurement: what it is, what it says to an engineer, and what the user knows of the instruments."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from study.figures.labels import term_names
 from study.records.readers.options import options_beside, read_options
 from study.support.arrays import Bools, Floats
 from study.support.errors import at, expect
+from study.support.thresholds import K
 
 OFFSET, DRIFT, HUM, DELAY, HIGH_PASS = "offset", "drift", "hum", "delay", "high_pass"
 SPIKES, DROP_OUTS, CLIPPING = "spikes", "drop_outs", "clipping"
@@ -190,3 +191,11 @@ def settings_of(given: Given) -> FaultSettings:
         expect(name != "gain_change" or value is None or value > -1.0, f"gain_change is {value}; expected it above -1")
     held = {name: value for name, value in given.items() if value is not None and value != 0.0}
     return FaultSettings(held, tuple(name for name in given if name not in held))
+
+
+def same(one: Sequence[Fault], other: Sequence[Fault]) -> bool:
+    """Whether two searches found the same faults to correct, with values that their errors cannot tell apart."""
+    mine, theirs = ({(f.fault, f.channel): f for f in faults if f.corrected} for faults in (one, other))
+    return set(mine) == set(theirs) and all(
+        abs(f.value - theirs[key].value) <= K * (f.error**2 + theirs[key].error ** 2) ** 0.5 for key, f in mine.items()
+    )

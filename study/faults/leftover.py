@@ -132,6 +132,14 @@ class FittedResidual:
         """Columns on both parts, zero where samples are lost."""
         return self.prepared.known(columns[0], self.spans[0]), self.prepared.known(columns[1], self.spans[1])
 
+    @cached_property
+    def missing(self) -> "FittedResidual | None":
+        """What is left beside the effect that explains most; None if none explains any of it.
+
+        One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
+        """
+        return _beside_the_best(self)
+
 
 @dataclass(frozen=True, eq=False)
 class SensorResidual:
@@ -352,11 +360,7 @@ def asks_for_more(left: FittedResidual) -> bool:
     return any(f is not None and f.significant(len(found)) for f in found)
 
 
-def missing(left: FittedResidual) -> FittedResidual | None:
-    """What is left beside the effect that explains most; None if none explains any of it.
-
-    One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
-    """
+def _beside_the_best(left: FittedResidual) -> FittedResidual | None:
     prepared, fit = left.prepared, left.fit
     look = prepared.shortened(
         int(np.clip(prepared.samples_in(shape_search.SEARCH_PERIODS), shape_search.SEARCH_SAMPLES, LONGEST_LOOK))

@@ -6,7 +6,7 @@ a single number describes is found together with the model's own coefficients.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -29,6 +29,7 @@ from study.faults.fault import (
     SPIKES,
     Fault,
     Held,
+    same,
 )  # fmt: skip
 from study.faults.force_noise import force_noise
 from study.faults.leftover import (
@@ -41,7 +42,6 @@ from study.faults.leftover import (
     leaves_less,
     left_again,
     leftover,
-    missing,
     refitted,
     share,
     unphysical,
@@ -83,6 +83,13 @@ class SearchStage:
         """The effects that the record asks for."""
         return effects_beside(self.rich, self.left)
 
+    def stands_at(self, other: "SearchStage") -> bool:
+        """Whether another search has come to the same faults and effects, beside which as much is left."""
+        pairs = (self.left, other.left), (self.rich, other.rich)
+        alike = all(abs(a.relative_power - b.relative_power) <= TOLERANCE * b.relative_power for a, b in pairs)
+        mine, theirs = ({(f.fault, f.channel) for f in one.faults} for one in (self, other))
+        return alike and mine == theirs and same(self.faults, other.faults) and set(self.effects) == set(other.effects)
+
     def again(self, prepared: Prepared) -> tuple[FittedResidual | None, FittedResidual | None]:
         """Both models fitted to a record that is corrected otherwise; they may be one."""
         models = [self.left, self.rich] if self.rich is not self.left else [self.left]
@@ -111,6 +118,7 @@ class SearchEnd:
     faults: tuple[Fault, ...]  # those that were known and those that were found
     fit: FreeRunFit  # the model fitted to the corrected record; it searches no further than from where it began
     rich: FreeRunFit  # the model with the effects that the record asks for beside the faults
+    passed: tuple[SearchStage, ...] = ()  # stages in which faults were looked for that compete with physics
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,26 +186,35 @@ def searched_part(given: Prepared) -> Prepared:
 
 
 def search_faults(
-    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked]
-) -> SearchEnd:  # fmt: skip
+    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked], before: SearchEnd | None = None
+) -> SearchEnd:
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
 
     ``asked`` is what is looked for and where, ``fit`` is the model fitted to the record with the known faults
     corrected. Of a long record, faults that compete with physics are looked for in a stretch of either part; the
-    others everywhere.
+    others everywhere. A search ends as the one ``before`` where it arrives at what that has passed, or where effects
+    have made needless what it alone began with.
     """
-    look = searched_part(given)
+    look, passed = searched_part(given), list[SearchStage]()
+    own, theirs = ({(f.fault, f.channel) for f in some} for some in (faults, before.faults if before else faults))
     near = fit if look is given else refitted(fit, corrected(look, faults))
-    stage = None if near is None else _searched(look, near, near, faults, asked)
+    for stage in _stages(look, near, near, faults, asked):
+        if before is not None:
+            begun = [f for f in stage.faults if stage.effects and (f.fault, f.channel) in own - theirs]
+            needless = begun and all(_without_needless(f, stage, len(asked), faults) for f in begun)
+            if needless or any(map(stage.stands_at, before.passed)):
+                return before
+        passed.append(stage)
+    stage = _needed(passed[-1], len(asked), faults) if passed else None
     if stage is not None and look is not given:
         known = tuple(f for f in stage.faults if f.fault not in UNLIKE_PHYSICS)
         left, rich = (refitted(one.fit, corrected(given, known)) for one in (stage.left, stage.rich))
         plain = tuple(one for one in asked if one[0] in UNLIKE_PHYSICS)
-        stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
-        stage = None if stage is None else _values_again(stage)
+        whole = list(_stages(given, left, rich, known, plain))
+        stage = _values_again(_needed(whole[-1], len(plain), known)) if whole else None
     if stage is None:
         return SearchEnd(tuple(faults), fit, fit)
-    return SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
+    return SearchEnd(stage.faults, stage.left.fit, stage.rich.fit, tuple(passed))
 
 
 def _values_again(stage: SearchStage) -> SearchStage:
@@ -212,26 +229,29 @@ def _values_again(stage: SearchStage) -> SearchStage:
     return stage
 
 
-def _searched(
-    given: Prepared, fit: FreeRunFit, rich: FreeRunFit, faults: Sequence[Fault], asked: Sequence[Asked]
-) -> SearchStage | None:  # fmt: skip
-    """Where a search ends; None where the model does not run. ``rich`` is the model with the effects known by now."""
+def _stages(
+    given: Prepared, fit: FreeRunFit | None, rich: FreeRunFit | None, faults: Sequence[Fault], asked: Sequence[Asked]
+) -> Iterator[SearchStage]:
+    """The stages of a search; none where the model does not run. ``rich`` is that with the effects known by now."""
     prepared = corrected(given, faults)
-    left = leftover(fit, prepared)
-    more = left if rich is fit else leftover(rich, prepared)
+    left = None if fit is None else leftover(fit, prepared)
+    more = left if rich is fit or rich is None else leftover(rich, prepared)
     if left is None or more is None:
-        return None
+        return
     stage = SearchStage(given, tuple(faults), left, more)
     if any(f.fault == CLIPPING for f in faults):  # noise may have kept samples within a limit that clips
         wider = tuple(widened(f, given, left.of(f.channel)) if f.fault == CLIPPING else f for f in faults)
         again = left_again(left, corrected(given, wider))
         stage = stage if again is None else SearchStage(given, wider, again, again)
+    yield stage
     for _ in range(ROUNDS):
-        following = None if work.is_done() else _next(stage, asked)
+        before, following = stage.faults, None if work.is_done() else _next(stage, asked)
         if following is None:
             break
         stage = following
-    return _needed(stage, len(asked), faults)
+        yield stage
+        if any(fault.fault == FORCE_NOISE for fault in stage.faults[len(before) :]):
+            break  # which is said where nothing else is found
 
 
 def _next(stage: SearchStage, asked: Sequence[Asked]) -> SearchStage | None:
@@ -277,7 +297,7 @@ def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> Se
     def of_physics() -> tuple[bool, FittedResidual | None]:
         """Whether an effect is asked for whatever becomes of the fault, and that effect."""
         sure = more and alone and asks_for_more(stage.rich)
-        return sure, missing(stage.rich) if sure else None
+        return sure, stage.rich.missing if sure else None
 
     one, (sure, effect) = two_at_once(
         lambda: None if best is None else refined(best, stage.given, stage.faults, stage.rich), of_physics
@@ -286,7 +306,7 @@ def _contested(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> Se
         t = abs(one.fault.value) / one.fault.error
         one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
     if one is not None and more and not sure:
-        effect = missing(stage.rich)
+        effect = stage.rich.missing
     if one is None:
         return _noisy_force(stage, open_ones, asked) if effect is None else _beside(effect, stage)
     if effect is None:
@@ -329,7 +349,7 @@ def _noisy_force(stage: SearchStage, open_ones: Sequence[Asked], asked: int) -> 
     noise = None if left is None else force_noise(left, forces, asked)
     if noise is None:
         return None
-    effect = missing(stage.rich) if len(stage.effects) < EFFECTS else None
+    effect = stage.rich.missing if len(stage.effects) < EFFECTS else None
     return replace(stage, faults=(*stage.faults, noise)) if effect is None else _beside(effect, stage)
 
 
@@ -396,24 +416,27 @@ def _needed(stage: SearchStage, asked: int, begun: Sequence[Fault]) -> SearchSta
     """Without the faults that the effects found after them have made needless; ``begun`` were known from the start."""
     for fault in stage.faults:
         if fault.fault in (*HOLDABLE, DRIFT) and fault.corrected and not fault.held:
-            others = tuple(f for f in stage.faults if f is not fault)
-            prepared = corrected(stage.given, others)
-            left, rich = stage.again(prepared)
-            if left is None or rich is None:
-                continue
-            # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
-            known = (fault.fault, fault.channel) in [(f.fault, f.channel) for f in begun]
-            lost = known and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked)
-            if lost:
-                continue
-            if fault.fault == DRIFT:
-                seen = drift(rich.of(fault.channel), asked) is not None
-            else:
-                needed = share(rich, fault_columns(fault.fault, fault.channel, rich), leading=True)
-                seen = needed is not None and needed.significant(asked)
-            if not seen:
-                stage = SearchStage(stage.given, others, left, rich)
+            stage = _without_needless(fault, stage, asked, begun) or stage
     return stage
+
+
+def _without_needless(fault: Fault, stage: SearchStage, asked: int, begun: Sequence[Fault]) -> SearchStage | None:
+    """The stage without a fault that shows no more beside its effects; None if it is needed."""
+    others = tuple(f for f in stage.faults if f is not fault)
+    prepared = corrected(stage.given, others)
+    left, rich = stage.again(prepared)
+    if left is None or rich is None:
+        return None
+    # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
+    known = (fault.fault, fault.channel) in [(f.fault, f.channel) for f in begun]
+    if known and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked):
+        return None
+    if fault.fault == DRIFT:
+        seen = drift(rich.of(fault.channel), asked) is not None
+    else:
+        needed = share(rich, fault_columns(fault.fault, fault.channel, rich), leading=True)
+        seen = needed is not None and needed.significant(asked)
+    return None if seen else SearchStage(stage.given, others, left, rich)
 
 
 def refined(

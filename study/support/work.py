@@ -12,7 +12,7 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 Result = TypeVar("Result")
 
-MOST = 80e9, 80e9 / 8192  # operations of a diagnosis, faults included (three minutes of two cores); of each sample
+MOST = 56e9, 56e9 / 8192  # operations of a diagnosis, faults included (a minute of two cores); of each sample
 ENDED = "at its limit of work (--thorough goes on)"
 
 

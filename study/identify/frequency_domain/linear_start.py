@@ -197,10 +197,11 @@ def lumped_start(model: Model, prepared: Prepared, held: Mapping[str, float]) ->
         If nothing drives the structure, or no structure of this kind responds like it.
     """
     linear = replace(model, terms=tuple(t for t in model.terms if t.term.name in LINEAR))
-    return dict(_of_linear_terms(linear, prepared, tuple(held.items()), loose_motions(model) > 0))
+    known = tuple((key, value) for key, value in held.items() if key in linear.values)  # others say nothing of these
+    return dict(_of_linear_terms(linear, prepared, known, loose_motions(model) > 0))
 
 
-@lru_cache(maxsize=2)  # of the records that the threads are working on
+@lru_cache(maxsize=4)  # of the records that the threads are working on
 def _of_linear_terms(
     model: Model, prepared: Prepared, known: tuple[tuple[str, float], ...], loose: bool
 ) -> dict[str, float]:  # fmt: skip

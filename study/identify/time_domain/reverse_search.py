@@ -27,6 +27,7 @@ from study.records.noise_floor import band_above_noise, in_band
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
 from study.records.spectra import StretchTransforms, stretch_transforms
+from study.support import work
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
@@ -119,10 +120,17 @@ class EquationsAlongMotion:
         """Columns, shape (n s, ...), less what the model's own coefficients could do."""
         return columns - self.basis @ (self.basis.T @ columns)
 
+    @cached_property
+    def operations(self) -> int:
+        """Those that a point takes: its transforms, to the sensors and back, and what the model's own do of it."""
+        size = self.transforms.size
+        return int((1 + len(self.base.fit.outputs)) * size * np.log2(size)) + self.basis.size
+
     def point(self, entry: ModelTerm, parameters: tuple[float, ...]) -> "Start | None":
         """What an effect at a place explains with these shape parameters; None where it acts nowhere."""
         from study.identify.time_domain.shape_search import explained_by
 
+        work.add(self.operations)
         given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
         try:
             forces = self.unit_forces(given, self.record(entry.place))
