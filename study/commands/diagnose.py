@@ -35,7 +35,7 @@ def add_diagnosis_arguments(parser: argparse.ArgumentParser) -> None:
         help="a candidate of your own; NAME(vs)=tanh(v/vs) has a parameter to be fitted",
     )  # fmt: skip
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="do not try this effect")
-    parser.add_argument("--thorough", action="store_true", help="search to the end, instead of for about three minutes")
+    parser.add_argument("--thorough", action="store_true", help="search to the end, instead of for about a minute")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

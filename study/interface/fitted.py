@@ -251,7 +251,7 @@ class Fit(FitPictures):
         without : sequence of str
             Effects of the library to leave out.
         thorough : bool
-            Whether to search to the end, instead of for about three minutes.
+            Whether to search to the end, instead of for about a minute.
 
         Raises
         ------

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from study.diagnose import confirmed_faults
-from study.diagnose.confirmed_faults import diagnose_accounted, same
+from study.diagnose.confirmed_faults import diagnose_accounted
 from study.diagnose.verdict import SEVERAL, UNKNOWN
-from study.faults.fault import Fault
+from study.faults.fault import Fault, same
 from study.support import work
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE

@@ -6,6 +6,7 @@ import pytest
 from study.compare.comparison import compare
 from study.compare.comparison_report import comparison_document
 from study.equations.model import Model
+from study.identify.frequency_domain import linear_start
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.records.plan import make_plan
 from study.records.prepared import prepare_record
@@ -88,6 +89,16 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
         start = lumped_start(free, prepare_record(record_of(without=without)), {})
         masses = [start[f"m[floor{i}]"] / frame.values[f"m[floor{i}]"] for i in (1, 2, 3)]
         assert np.max(np.abs(np.array(masses) - 1.0)) < 0.1
+
+
+def test_what_another_term_holds_says_nothing_of_the_linear_ones(frame, record_of):
+    """Each candidate with a shape of its own would have them searched for anew, and their size left as it is drawn."""
+    linear = frame.without_term("cubic_stiffness[floor2-floor3]")
+    free, prepared = linear.with_values(dict.fromkeys(linear.values, None)), prepare_record(record_of())
+    before = linear_start._of_linear_terms.cache_info().misses
+    starts = [lumped_start(free, prepared, held) for held in ({}, {"dead_band[floor1].gap": 1e-3})]
+    assert starts[0] == starts[1]
+    assert linear_start._of_linear_terms.cache_info().misses == before + 1
 
 
 def test_what_cannot_be_judged_gets_its_sentence(believed, record_of):
