@@ -47,7 +47,7 @@ for _chapter, _contents in CHAPTERS.items():
             chapter=_chapter,
             study=CLAIM_SETTINGS,
             own=PART_TWO.plain()[_chapter],
-        priority: 1
+        priority: 1 + (_chapter in ("excitations", "noise"))  # as of the ladders
         benchmark:
             f"results/benchmarks/chapter.{_chapter}.tsv"
         run:
@@ -66,6 +66,7 @@ rule ladders:
         ladders={name: row.plain() for name, row in LADDERS.items()},
         titles={name: TITLES[LADDER_ROWS[name].entry] for name in LADDERS},
         there=[path for row in LADDER_ROWS.values() for path in row.paths if Path(path).is_file()],
+    priority: 2  # takes long: last, it would keep the other cores waiting
     benchmark:
         "results/benchmarks/chapter.measured.tsv"
     run:

@@ -11,13 +11,16 @@ from study.commands.measurements import Measurement
 from study.commands.parser import parser
 from study.commands.record_arguments import layout_of, read_records
 from study.compare.comparison import compared_fit
-from study.compare.prediction import predict
+from study.compare.prediction import Prediction, predict
 from study.equations.laid_variations import with_laid_variations
-from study.equations.model import ModelTerm, free
+from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.equations.variation import Variation, varying
-from study.faults.fault import FAULTS, settings_of
+from study.faults.correction import corrected
+from study.faults.fault import NOTHING_ASKED, Fault, settings_of
+from study.faults.leftover import leftover
+from study.faults.search import asked_of, refined
 from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import Prepared
 from study.support.config_files import TableRow, Text, read_rows
@@ -56,8 +59,8 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
 def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
     """Errors of every step on the judged samples: relative, in the response's unit, and the noise floor.
 
-    The faults that the ladder names are corrected as the first model has them. A climb looks for all of them, which
-    takes as long as the ladder. A step whose model cannot be fitted has the reason as its note.
+    The faults that the ladder names are corrected as the last model has them, for all models alike. A step whose model
+    cannot be fitted has the reason as its note.
     """
     options = list(row.options)
     if ladder.fit:
@@ -66,18 +69,19 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
     layout = layout_of(arguments, records[0])
-    settings = settings_of({name: None for name in FAULTS if name not in ladder.faults})
     prepared: Prepared | None = None
     for step in range(len(ladder.terms) + 1):
         about = {"record": row.record, "title": title, "step": step, "added": "", "published": ladder.published}
         if step:
             entry = _entry(ladder.terms[step - 1])
             model, about["added"] = model.with_term(entry), entry.name
+        prediction: Prediction | None = None
         try:
             if prepared is None:
-                first = compare_records(records, model, layout, settings, absolute=arguments.absolute).comparison
-                prepared, prediction = first.prepared, first.prediction
-            else:
+                first = compare_records(records, model, layout, NOTHING_ASKED, absolute=arguments.absolute).comparison
+                prepared = _corrected(first.prepared, ladder, model)
+                prediction = first.prediction if prepared is first.prepared else None
+            if prediction is None:
                 fit = fit_model(with_laid_variations(model, prepared), prepared)
                 prediction = predict(compared_fit(fit, prepared)[0], prepared)
         except StudyError as error:
@@ -89,6 +93,21 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             "unit": prepared.record.units.get(str(worst.sensor), ""), "floor": prediction.floor, "note": "",
         })  # fmt: skip
     return pd.DataFrame(rows, columns=LADDER_COLUMNS)
+
+
+def _corrected(prepared: Prepared, ladder: Ladder, model: Model) -> Prepared:
+    """The record without the faults that the ladder names, of the values that they have beside its last model."""
+    if not ladder.faults:
+        return prepared
+    for words in ladder.terms:
+        model = model.with_term(_entry(words))
+    left, found = leftover(fit_model(with_laid_variations(model, prepared), prepared), prepared), list[Fault]()
+    for asked in asked_of(prepared, ladder.faults, {}):
+        one = None if left is None else refined(asked, prepared, found, left)
+        expect(one is not None, f"{prepared.record.name}: no {' of the '.join(asked)} is found beside the last model")
+        if one is not None:
+            left, found = one.left, [*found, one.fault]
+    return corrected(prepared, found)
 
 
 def _entry(words: str) -> ModelTerm:

@@ -7,12 +7,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.commands.ladder import climbed_ladder, load_ladders, missing_ladder
+from study.commands import ladder as ladder_module
+from study.commands.ladder import Ladder, climbed_ladder, load_ladders, missing_ladder
 from study.commands.measurements import load_measurements
 from study.equations.model_file import read_model
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.frequency_domain.noisy_inputs import expected_spectra
 from study.records.excitation import displacement_noise
+from study.records.prepared import prepare_record
 from study.records.spectra import Segments, cross_spectra
 from study.reproduction import whole_page
 from study.reproduction.cases import make_record
@@ -31,6 +33,7 @@ from study.reproduction.config import load_config
 from study.support.config_files import read_yaml
 from study.support.document import Picture, markdown
 from study.support.errors import StudyError
+from study.trials import DRIVEN_MASS, make_trial
 from tests.public_records import needs
 from tests.reproduction.test_summary import study
 
@@ -192,6 +195,24 @@ def test_ladders_name_records_and_terms_that_there_are(tmp_path):
         (tmp_path / "ladders.tsv").write_text(f"{head}{row}\tx\n")
         with pytest.raises(StudyError, match=named):
             load_ladders(tmp_path, rows)
+
+
+def test_a_ladder_corrects_the_faults_that_it_names_of_the_values_that_its_last_model_tells():
+    """Beside the first model, which lacks a quadratic stiffness, the offset is another one."""
+    made = make_trial(560_001, ("quadratic_stiffness",), 1e-4, "displacement", "offset", DRIVEN_MASS)
+    given, offset = prepare_record(made.record), made.fault["value"]
+    off = {}
+    for terms in ((), ("quadratic_stiffness",)):
+        ladder = Ladder(record="x", terms=terms, fit="", faults=("offset",), published="x")
+        corrected = ladder_module._corrected(given, ladder, made.believed)
+        removed = given.record["displacement"] - corrected.record["displacement"]
+        assert np.ptp(removed) < 1e-12
+        off[terms] = abs(float(np.mean(removed)) / offset - 1.0)
+    assert off["quadratic_stiffness",] < 0.05 < off[()]
+    assert (
+        ladder_module._corrected(given, Ladder(record="x", terms=(), fit="", faults=(), published="x"), made.believed)
+        is given
+    )
 
 
 @needs("friction_damper")

@@ -130,7 +130,7 @@ def told_measured(tables: Tables) -> list[Block]:
     said = (
         "Each ladder begins with the model that an engineer would believe in (config/measurements.tsv); its errors are "
         "those of a free run along the part of the record that was not fitted. An offset of the Silverbox's "
-        "response is corrected as the first model has it."
+        "response is corrected as the last model has it."
     )
     left = [Text(sentence) for sentence in left_out_records(tables)]
     head = ("record", "model", "error", "rms", "noise floor", "literature")
