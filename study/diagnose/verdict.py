@@ -104,6 +104,7 @@ class Diagnosis:
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 
+UNCHANGED = f"{work.ENDED}, before changes were asked for"
 Otherwise = Callable[[Diagnosis], bool]  # whether what is left beside what is found has another reason than a change
 
 
@@ -142,6 +143,7 @@ def _diagnosed(
         if other is not None and other.changes:
             return other  # else nothing that is named changes, and the record is judged as it was
         elsewhere = 0 if other is None else len(changes.shares)
+        ended = UNCHANGED if other is None and work.is_done() else ""
     del changes  # and the record laid out anew: of a long one it takes as much as all that follows
     if (freed := _freed(comparison, base, tried)) is not None:
         return _diagnosed(freed, extra, without, progress, otherwise)
@@ -156,7 +158,7 @@ def _diagnosed(
         return found
     if named[0].prediction.above_noise <= TOLERANCE:
         return found
-    cut_short = replace(found, ended=found.ended or f"{work.ENDED}, before changes were asked for")
+    cut_short = replace(found, ended=found.ended or UNCHANGED)
     if work.is_done():
         return cut_short
     # what changes may be the smaller part of what is missing, and seen beside the larger one alone
@@ -168,9 +170,9 @@ def _diagnosed(
     if work.is_done():
         return cut_short
     other = _changing(changes, comparison, base, tried, entries, progress, beside=True)
-    if other is None or not other.changes:
-        return found if other is None else replace(found, ended=other.ended)
-    return other
+    if other is None:
+        return cut_short if work.is_done() else found
+    return other if other.changes else replace(found, ended=other.ended)
 
 
 def _where_none_explains_it(
@@ -194,13 +196,18 @@ def _changing(
     promised: PromisedChanges, comparison: Comparison, base: Baseline, tried: Sequence[FittedCandidate],
     entries: Sequence[ModelTerm], progress: Progress | None, *, beside: bool = False,
 ) -> Diagnosis | None:  # fmt: skip
-    """The diagnosis with changes that are promised, ``beside`` other effects perhaps; None where no model follows."""
+    """The diagnosis with changes that are promised, ``beside`` other effects perhaps.
+
+    None where no model follows, or all is done that may be before the changes themselves are asked for.
+    """
     suspect = varying_candidates.suspect(promised, comparison)
     if suspect is None:
         return None
     as_it_was = suspect.comparison is comparison
     base = base if as_it_was else search_base(suspect.comparison)
     others = tried if tried and as_it_was else candidates.try_all(entries, base, progress)
+    if work.is_done():
+        return None
     changes = varying_candidates.simplest(candidates.try_all(suspect.entries, base, progress))
     every, both = [*others, *changes], [*entries, *suspect.entries]
     diagnosed = partial(_diagnosis, suspect.comparison, base, every, both, progress, beside=beside)
