@@ -202,7 +202,8 @@ def search_faults(
         if before is not None:
             begun = [f for f in stage.faults if stage.effects and (f.fault, f.channel) in own - theirs]
             needless = begun and all(_without_needless(f, stage, len(asked), faults) for f in begun)
-            if needless or any(map(stage.stands_at, before.passed)):
+            arrived = passed and any(map(stage.stands_at, before.passed))  # as it begins it differs by its fit alone
+            if needless or arrived:
                 return before
         passed.append(stage)
     stage = _needed(passed[-1], len(asked), faults) if passed else None

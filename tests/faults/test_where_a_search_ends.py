@@ -62,6 +62,13 @@ def test_a_search_that_arrives_where_another_has_passed_ends_as_that(monkeypatch
     assert asked == 2
 
 
+def test_where_it_begins_it_stands_nowhere_yet(monkeypatch):
+    """Before a fault is corrected a drift may be nearly all that is left, whatever the values of the model are."""
+    end, _, asked = searched(monkeypatch, [stage((), 1.0), stage((LATE,), 0.3)])
+    assert end.faults == (LATE,)
+    assert asked == 2
+
+
 @pytest.mark.parametrize(
     "other",
     [
@@ -74,10 +81,10 @@ def test_a_search_that_arrives_where_another_has_passed_ends_as_that(monkeypatch
     ],
 )
 def test_elsewhere_it_goes_on_to_its_own_end(monkeypatch, other):
-    end, before, asked = searched(monkeypatch, [other, stage((LATE,), 0.3)])
+    end, before, asked = searched(monkeypatch, [stage((), 0.9), other, stage((LATE,), 0.3)])
     assert end is not before
     assert end.faults == (LATE,)
-    assert asked == 2
+    assert asked == 3
 
 
 @pytest.mark.parametrize(("needless", "expected"), [(True, 2), (False, 3)])
