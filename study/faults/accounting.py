@@ -287,7 +287,7 @@ def _beneath_too(
     columns = np.stack([under.get(str(sensor), none) for sensor in begun.outputs.sensors], axis=1)
     whole = replace(begun, residual=begun.residual + begun.outputs.stacked(columns[slice(*begun.span)]))  # as it is
     other = search_faults(prepared, whole, faults, asked, before=plain)
-    begun_with = any(fault.fault in (DRIFT, OFFSET) for fault in other.faults)
+    begun_with = other is not plain and any(fault.fault in (DRIFT, OFFSET) for fault in other.faults)
     return other if begun_with and _leaves_less(prepared, plain, other, "fit") else plain
 
 

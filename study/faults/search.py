@@ -235,8 +235,10 @@ def _stages(
 ) -> Iterator[SearchStage]:
     """The stages of a search; none where the model does not run. ``rich`` is that with the effects known by now."""
     prepared = corrected(given, faults)
-    left = None if fit is None else leftover(fit, prepared)
-    more = left if rich is fit or rich is None else leftover(rich, prepared)
+    if fit is None or rich is None:
+        return
+    left = leftover(fit, prepared)
+    more = left if rich is fit else leftover(rich, prepared)
     if left is None or more is None:
         return
     stage = SearchStage(given, tuple(faults), left, more)

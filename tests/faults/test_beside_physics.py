@@ -142,3 +142,10 @@ def test_a_rest_begins_where_friction_holds_the_mass_whatever_rounding_leaves_of
     velocity = np.array([[0.5, 0.2, 1e-34, 1e-34, 1e-34, 0.1, 0.3]]).T
     assert _turning(velocity).tolist() == [False, True, True, False, True, True, False]
     assert _turning(-velocity).tolist() == _turning(velocity).tolist()
+
+
+def test_a_drift_that_is_nearly_all_that_a_linear_model_leaves_is_seen_beneath_the_response():
+    """The search beneath it begins with as much left as the plain one, which sees nothing, and goes on to its end."""
+    (drift,) = found(21, "cubic_stiffness", 0.01, None, "drift")[1]
+    assert drift.fault == "drift"
+    assert drift.corrected

@@ -119,6 +119,13 @@ def test_noise_on_the_force_that_was_known_from_the_start_ends_nothing(monkeypat
     assert len(list(search._stages(None, "fit", "fit", (NOISE,), ASKED))) == 3
 
 
+@pytest.mark.parametrize("fits", [(None, None), (None, "rich"), ("fit", None)])
+def test_a_search_whose_models_do_not_run_has_no_stages(monkeypatch, fits):
+    monkeypatch.setattr(search, "corrected", lambda given, _: given)
+    monkeypatch.setattr(search, "leftover", lambda *_: left(1.0))
+    assert not list(search._stages(None, *fits, (), ASKED))
+
+
 @pytest.mark.parametrize(("above_noise", "asked"), [(0.5 * TOLERANCE, False), (2.0 * TOLERANCE, True), (None, True)])
 def test_nothing_lies_beneath_what_leaves_noise_alone(monkeypatch, above_noise, asked):
     found = None if above_noise is None else SimpleNamespace(prediction=SimpleNamespace(above_noise=above_noise))
