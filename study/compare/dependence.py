@@ -6,7 +6,7 @@ for those of the past and of time, and at the many places of a structure, the fo
 The first part of the record says how much of each, the second how much of the residual that explains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,6 +28,7 @@ from study.records.record import MOTIONS, Sensor
 from study.records.spectra import StretchTransforms
 from study.support import statistics
 from study.support.arrays import Complexes, Floats
+from study.support.cores import side_by_side
 from study.support.errors import DivergenceError
 from study.support.least_squares import Factored, factored, least_squares
 from study.support.numbers import BEYOND_MEASURE
@@ -173,7 +174,8 @@ def families(left: Unexplained) -> list[FamilyGain]:
 
     At most one, negative for nothing.
     """
-    found = [gain for place in connections(left.base.fit.model) for gain in _families_at(place, left)]
+    places = connections(left.base.fit.model)
+    found = [gain for gains in side_by_side(lambda place: _families_at(place, left), places) for gain in gains]
     return sorted(found, key=lambda f: -f.gain.explained)
 
 
@@ -193,18 +195,23 @@ def significant_share(left: Unexplained, level: float) -> float:
     than a whole family may, but what little noise leaves to be seen it sees sooner. ``level`` is of the p value, all
     that was asked accounted for; zero where nothing is significant.
     """
-    gains = [found.gain for found in families(left)]
-    for place in connections(left.base.fit.model):
-        gains += _one_by_one(
-            left, np.hstack([*_shapes(place, left).values(), left.passed(place, _states(place, left))])
-        )
+
+    def asked_at(place: Place) -> list[Gain]:
+        along = _along_motion(place, left)
+        return [f.gain for f in _families_at(place, left, along)] + _one_by_one(left, np.hstack([*along.values()]))
+
+    gains = [gain for own in side_by_side(asked_at, connections(left.base.fit.model)) for gain in own]
     return max((0.0, *(g.explained for g in gains if g.p_value * len(gains) < level)))
 
 
-def _families_at(place: Place, left: Unexplained) -> list[FamilyGain]:
-    columns = _shapes(place, left)
-    columns["past"] = left.passed(place, _states(place, left))
-    columns["time"] = left.passed(place, _times(place, left))
+def _along_motion(place: Place, left: Unexplained) -> dict[str, Floats]:
+    """What shapes of the motion at a place, and of its past, add to the response, (n s, shapes) each."""
+    return {**_shapes(place, left), "past": left.passed(place, _states(place, left))}
+
+
+def _families_at(place: Place, left: Unexplained, along: Mapping[str, Floats] | None = None) -> list[FamilyGain]:
+    along = _along_motion(place, left) if along is None else along
+    columns = {**along, "time": left.passed(place, _times(place, left))}
     found = {name: _held_out(left, own) for name, own in columns.items()}
     for name, x in zip(MOTIONS[:2], left.along(place), strict=True):
         detailed = _held_out(left, left.passed(place, _hats(x)))

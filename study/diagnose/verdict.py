@@ -346,13 +346,14 @@ def _decide(
     answer = next((r for r in sets if believed(r, prediction, own)), None)
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
         return replace(one, ended=search.ended)
-    answer, left = _material(answer, sets, search, comparison)
+    left = one.left if first is not None and answer.fit is first.fit else _left(answer.fit, answer.prediction)
+    answer, left = _material(answer, left, sets, search, comparison)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
     if verdict == UNKNOWN and first is not None and (unusual or _stands_out(first, comparison.prepared)):
         first_alone = [first] + [r for r in rows if r is not first]
         return replace(one, verdict=MISSING, rows=first_alone, ended=search.ended)
-    core = _necessary(good, search, comparison, asked) if verdict == UNKNOWN else None
+    core = _necessary(good, search, rows, comparison, asked) if verdict == UNKNOWN else None
     if core is not None and believed(core, prediction, own) and not core.wanders(asked):
         verdict, answer, left = PARTLY_KNOWN, core, _left(core.fit, core.prediction)
         good = [core, *(r for r in good if r.name != core.name)]
@@ -437,15 +438,14 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
 
 
 def _material(
-    answer: Ranked, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
+    answer: Ranked, left: float, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
 ) -> tuple[Ranked, float]:
-    """The set without effects that explain less than what is left beside all: they imitate a part of that.
+    """The set without effects that explain less than what is left beside all, and what is left: they imitate of that.
 
     Without those as well that explain no more than models of real structures leave, and next to nothing of what is
     unexplained: the others are missing, whatever is missing besides.
     """
     ranked, unexplained = {frozenset(r.names): r for r in sets}, comparison.prediction.error
-    left = _left(answer.fit, answer.prediction)
     while len(answer.entries) > 1:
         names = frozenset(answer.names)
         smaller = [c for name in names if (c := search.without(names, name)) is not None]
@@ -466,7 +466,9 @@ def _material(
     return answer, left
 
 
-def _necessary(sets: Sequence[Ranked], search: SetSearch, comparison: Comparison, asked: int) -> Ranked | None:
+def _necessary(
+    sets: Sequence[Ranked], search: SetSearch, rows: Sequence[Ranked], comparison: Comparison, asked: int
+) -> Ranked | None:
     """What all sets have that the record cannot tell apart, as a set of its own; None where they have nothing alike.
 
     Beside a force that the library lacks they imitate it in ways of their own, and have what is truly there in common.
@@ -478,7 +480,7 @@ def _necessary(sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
         names = names - {name}
         if names not in search.tried:
             return None
-    core = search.tried.get(common)
+    core = next((row for row in rows if frozenset(row.names) == common), search.tried.get(common))
     if core is None:
         return None
     row = rank(with_best_settled([core], comparison.prepared), comparison, asked + len(search.tried))[0]

@@ -74,7 +74,7 @@ def test_an_effect_explains_more_than_what_is_left_or_goes(monkeypatch: pytest.M
     monkeypatch.setattr(verdict, "_left", lambda *_: left)
     rows: Any = list(sets.values())
     comparison: Any = SimpleNamespace(prediction=SimpleNamespace(error=0.5))
-    answer, beside = verdict._material(sets[frozenset("abc")], rows, search, comparison)
+    answer, beside = verdict._material(sets[frozenset("abc")], left, rows, search, comparison)
     assert "".join(answer.names) == kept
     assert beside == left
 
@@ -87,7 +87,7 @@ def test_an_effect_that_explains_next_to_nothing_goes(monkeypatch: pytest.Monkey
     monkeypatch.setattr(verdict, "_left", lambda *_: 0.0)
     rows: Any = list(sets.values())
     comparison: Any = SimpleNamespace(prediction=SimpleNamespace(error=before))
-    answer, _ = verdict._material(sets[frozenset("ab")], rows, search, comparison)
+    answer, _ = verdict._material(sets[frozenset("ab")], 0.0, rows, search, comparison)
     assert "".join(answer.names) == kept
 
 
@@ -111,8 +111,24 @@ def test_what_all_good_sets_have_is_a_set_of_its_own(
         SimpleNamespace(**vars(row), gain=SimpleNamespace(explained=explained), unphysical=unphysical) for row in rows
     ])  # fmt: skip
     comparison: Any = SimpleNamespace(prepared=None)
-    found = verdict._necessary([a_set(names, 0.1) for names in sets], search, comparison, 9)
+    found = verdict._necessary([a_set(names, 0.1) for names in sets], search, [], comparison, 9)
     assert ("".join(found.names) if found else None) == core
+
+
+def test_an_effect_that_was_settled_alone_is_not_settled_again_as_what_all_sets_have(monkeypatch: pytest.MonkeyPatch):
+    """Of a structure at its limit of work that took 3e9 operations for the second time."""
+    tried = {frozenset(names): a_set(names, 0.1) for names in ("a", "c", "d", "ac", "ad")}
+    search: Any = SimpleNamespace(tried=tried, without=lambda names, name: tried.get(names - {name}))
+    asked: list[Any] = []
+    monkeypatch.setattr(verdict, "with_best_settled", lambda rows, _: asked.extend(rows) or rows)
+    monkeypatch.setattr(
+        verdict, "rank", lambda rows, *_: [SimpleNamespace(gain=SimpleNamespace(explained=0.95), unphysical="")]
+    )
+    comparison: Any = SimpleNamespace(prepared=None)
+    row: Any = a_set("a", 0.09)
+    assert verdict._necessary([a_set("ac", 0.1), a_set("ad", 0.1)], search, [row], comparison, 9)
+    assert asked == [row]
+    assert asked[0] is row
 
 
 @pytest.fixture(scope="module")

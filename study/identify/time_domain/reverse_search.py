@@ -52,14 +52,19 @@ class EquationsAlongMotion:
         further = {name: source[name][slice(*fit.span)] for name in source.extra}
         return replace(own, channels={**own.channels, **further}, start=source.start + fit.first * source.dt)
 
+    @cached_property
+    def _omega(self) -> Complexes:
+        """j times the angular frequency of each line."""
+        dt = self.base.prepared.dt
+        return np.asarray(2j * np.pi * rfftfreq(self.transforms.size, dt), dtype=np.complex128)
+
     def unit_forces(self, entry: ModelTerm, record: Record) -> list[Complexes]:
         """Lines of the force of each component with a unit coefficient along a motion."""
-        omega = np.asarray(2j * np.pi * rfftfreq(self.transforms.size, record.dt), dtype=np.complex128)
         by_symbol: dict[str, Complexes] = {}
         for item in placed_inputs(entry):
             values = self.transforms.lines(record["displacement"] if item.shape == "u" else input_history(item, record))
             for part in item.parts:
-                by_symbol[part.symbol] = values * part.factor * omega**part.order
+                by_symbol[part.symbol] = values * part.factor * self._omega**part.order
         return [by_symbol[symbol] for symbol in entry.term.symbols]
 
     def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
@@ -126,14 +131,17 @@ class EquationsAlongMotion:
         size = self.transforms.size
         return int((1 + len(self.base.fit.outputs)) * size * np.log2(size)) + self.basis.size
 
-    def point(self, entry: ModelTerm, parameters: tuple[float, ...]) -> "Start | None":
-        """What an effect at a place explains with these shape parameters; None where it acts nowhere."""
+    def point(self, entry: ModelTerm, parameters: tuple[float, ...], record: Record) -> "Start | None":
+        """What an effect explains with these shape parameters along the motion at its place; None if it acts nowhere.
+
+        That is what :meth:`record` has of the place, for all points the same.
+        """
         from study.identify.time_domain.shape_search import explained_by
 
         work.add(self.operations)
         given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
         try:
-            forces = self.unit_forces(given, self.record(entry.place))
+            forces = self.unit_forces(given, record)
         except StudyError:
             return None
         added = self.beside_own(self.passed(entry.place, forces))

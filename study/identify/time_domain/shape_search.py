@@ -194,8 +194,9 @@ def _best(entry: ModelTerm, tried: Sequence[Start]) -> list[Start]:
 
 def _in_reverse(entry: ModelTerm, base: Baseline) -> list[Start]:
     """The points for a candidate beside the equations of all coordinates, by the share that it explains of them."""
-    u = base.reverse.record(entry.place)["displacement"]
-    found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
+    record = base.reverse.record(entry.place)
+    points = points_to_try(entry, record["displacement"], base)
+    found = [base.reverse.point(entry, parameters, record) for parameters in points]
     return sorted((point for point in found if point is not None), key=lambda s: -s.share)
 
 
