@@ -122,7 +122,7 @@ def test_an_effect_that_was_settled_alone_is_not_settled_again_as_what_all_sets_
     asked: list[Any] = []
     monkeypatch.setattr(verdict, "with_best_settled", lambda rows, _: asked.extend(rows) or rows)
     monkeypatch.setattr(
-        verdict, "rank", lambda rows, *_: [SimpleNamespace(gain=SimpleNamespace(explained=0.95), unphysical="")]
+        verdict, "rank", lambda *_: [SimpleNamespace(gain=SimpleNamespace(explained=0.95), unphysical="")]
     )
     comparison: Any = SimpleNamespace(prepared=None)
     row: Any = a_set("a", 0.09)
