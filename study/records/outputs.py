@@ -30,13 +30,17 @@ class Outputs:
         """What the sensors show along a span, shape (n, sensors)."""
         return record.columns(self.sensors, span)
 
-    def stacked(self, values: Floats) -> Floats:
-        """Values (n, sensors, ...) weighted, those of one time side by side, shape (n sensors, ...)."""
+    def stacked(self, values: Floats, *, in_place: bool = False) -> Floats:
+        """Values (n, sensors, ...) weighted, those of one time side by side, shape (n sensors, ...).
+
+        ``in_place`` they are weighted where they stand: of derivatives a copy takes as long as their sums of products.
+        """
         if len(self.sensors) == 1:
             return values[:, 0]
         weights = np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
         with np.errstate(over="ignore"):  # what a motion that runs off leaves is beyond all measure
-            return (values * weights).reshape(len(values) * len(self.sensors), *values.shape[2:])
+            weighted = np.multiply(values, weights, out=values if in_place else None)
+        return weighted.reshape(len(values) * len(self.sensors), *values.shape[2:])
 
     def kept(self, lost: Bools) -> Floats:
         """1 for stacked values that count and 0 for those of lost samples, shape (n s,).

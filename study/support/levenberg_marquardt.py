@@ -112,23 +112,22 @@ def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> F
 
 
 def _products(jacobian: Floats, residual: Floats, begins: Sequence[int], at_a_time: int = 1 << 16) -> Floats:
-    """``X^T X`` of the rows X of each segment, Jacobian and residual side by side, shape (N, columns, columns).
+    """``X^T J`` of each segment, X being its Jacobian J and its residual side by side, (N, columns + 1, columns).
 
-    So many rows ``at_a_time``, so that a long record's Jacobian is not copied as a whole.
+    Of many segments so many rows ``at_a_time``, so that a long record's Jacobian is not copied as a whole.
     """
-    firsts = range(0, len(residual), at_a_time)
     if len(begins) == 1:
-        parts = (np.column_stack([jacobian[i : i + at_a_time], residual[i : i + at_a_time]]) for i in firsts)
-        return np.asarray(sum(rows.T @ rows for rows in parts), dtype=np.float64)[None]
+        return np.concatenate([jacobian.T @ jacobian, (residual @ jacobian)[None]])[None]
+    firsts = range(0, len(residual), at_a_time)
     bounds = np.array([*begins, len(residual)])
     block = min(int(np.max(np.diff(bounds))), 32)
     edges = [*np.unique(np.searchsorted(bounds[:-1], firsts)).tolist(), len(begins)]
     groups = (bounds[first : last + 1] for first, last in pairwise(edges) if last > first)
-    return np.concatenate([_in_blocks(jacobian, residual, own, block) for own in groups])
+    return np.concatenate([_in_blocks(jacobian, residual, own, block) for own in groups])[:, :, :-1]
 
 
 def _in_blocks(jacobian: Floats, residual: Floats, bounds: Ints, block: int) -> Floats:
-    """:func:`_products` of the segments between these bounds.
+    """``X^T X`` of the segments between these bounds, X as :func:`_products` has them.
 
     Segments are cut to blocks of equal length, short ones padded with zeros: one product of all blocks together takes
     a sixth of the time of hundreds of small ones.
@@ -170,7 +169,7 @@ def normal_equations(
     normal : Normal
     """
     products = _products(jacobian, residual, begins)
-    grams, rights = products[:, :-1, :-1], products[:, :-1, -1]
+    grams, rights = products[:, :-1], products[:, -1]
     links = None
     if continuity is not None:
         turned = continuity.jacobian.transpose(0, 2, 1)

@@ -48,7 +48,7 @@ def test_a_few_rows_at_a_time_are_all_of_them(begins: Sequence[int]) -> None:
     np.testing.assert_allclose(parts, whole, rtol=1e-13, atol=1e-13)
     rows = np.column_stack([jacobian, residual])
     for begin, end, own in zip(begins, (*begins[1:], 500), parts, strict=True):
-        np.testing.assert_allclose(own, rows[begin:end].T @ rows[begin:end], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(own, rows[begin:end].T @ jacobian[begin:end], rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("apart", [400_000, 50])

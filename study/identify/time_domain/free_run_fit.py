@@ -324,7 +324,8 @@ class _Problem:
             with np.errstate(over="ignore", invalid="ignore"):  # what is out of range is refused by point_at
                 gaps = self.weights * (arrivals[:, :, 0] - states[1:])
                 continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
-        residual, jacobian = self.measured - self.outputs.stacked(response), self.outputs.stacked(jacobian)
+        residual = self.measured - self.outputs.stacked(response)
+        jacobian = self.outputs.stacked(jacobian, in_place=True)
         residual, jacobian = self._weighted(residual), self._weighted(jacobian)
         begins = (0, *(len(self.outputs) * cut for cut in self.run.cuts))
         if len(self.penalty):
