@@ -187,14 +187,14 @@ def _program(formula: str, given: tuple[str, ...]) -> Program:
 
 
 def _settled(integrated: Callable[[int], Floats]) -> Floats:
-    """A term's state, in so many steps a sample that twice as many hardly change it.
+    """A term's state, in so many steps a sample that four times as many hardly change it.
 
     Loops that close sharply, and motion that is fast beside the sampling, ask for more; steps that are too long for a
     short memory make a state that grows without end, and may yet be finite.
     """
     states, steps = integrated(STATE_STEPS), STATE_STEPS
     while steps < MOST_STATE_STEPS:
-        steps *= 2
+        steps *= 4
         coarse, states = states, integrated(steps)
         with np.errstate(all="ignore"):
             if np.sum((states - coarse) ** 2) <= AGREED**2 * np.sum(states**2):  # false where one is not finite
