@@ -22,22 +22,14 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
     scale = _scale(columns)
-    if columns.shape[1] == 1 and scale[0] > 0.0:  # many a search asks for one: no decomposition is needed
-        unit = columns[:, 0] / scale[0]
-        return np.asarray((unit @ target)[None] / scale[0], dtype=np.float64)
     amounts: Floats = np.asarray(_lstsq(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
     return (amounts.T / scale).T
 
 
 def _scale(columns: Floats) -> Floats:
     """Length of each column, infinity for those that are nothing beside the others."""
-    small = np.sqrt(np.finfo(float).tiny)
-    with np.errstate(over="ignore"):
-        squares: Floats = np.einsum("ij,ij->j", columns, columns)
-    if np.all(np.isfinite(squares)) and np.min(squares, initial=1.0) > small * np.max(squares, initial=1.0):
-        return np.sqrt(squares)  # as a rule: no square overflowed, and none vanished
     peak = np.maximum(np.max(columns, axis=0, initial=0.0), -np.min(columns, axis=0, initial=0.0))
-    least = small * np.max(peak, initial=0.0)  # the square of a larger amount may be no number
+    least = np.sqrt(np.finfo(float).tiny) * np.max(peak, initial=0.0)  # the square of a larger amount may be no number
     peak = np.where(peak > least, peak, np.inf)  # first, so that no square overflows
     return peak * length_or_one(columns / peak)
 

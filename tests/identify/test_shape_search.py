@@ -120,3 +120,13 @@ def test_what_does_not_run_takes_nothing_from_what_it_stands_beside(fitted: Base
     assert seen is not None
     assert alone is not None
     np.testing.assert_allclose(seen, alone, rtol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-180, 1e180])
+def test_one_column_explains_what_least_squares_find(size: float):
+    random = np.random.default_rng(2)
+    added, residual = random.standard_normal((40, 1)), random.standard_normal(40)
+    found = shape_search.explained_by(size * added, residual, ())
+    amount, left = np.linalg.lstsq(added, residual)[:2]
+    assert found.coefficients[0] * size == pytest.approx(float(amount[0]), rel=1e-12)
+    assert found.share == pytest.approx(1.0 - float(left[0]) / float(residual @ residual), rel=1e-12)

@@ -270,7 +270,12 @@ def _along_one_run(points: Sequence[Point], base: Baseline) -> list[Floats | Non
 
 def explained_by(added: Floats, residual: Floats, parameters: tuple[float, ...]) -> Start:
     """One point: least squares of the residual on what a unit of each of the candidate's coefficients adds."""
-    amounts = least_squares(added, residual, CUTOFF)
+    if added.shape[1] == 1:  # as a rule, of thousands of points: no decomposition is needed
+        size = float(np.max(np.abs(added)))  # whose square may be no number
+        unit = added[:, 0] / size
+        amounts: Floats = np.array([float(unit @ residual) / float(unit @ unit) / size])
+    else:
+        amounts = least_squares(added, residual, CUTOFF)
     power = float(residual @ residual)
     share = 1.0 - float(np.sum((residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
     return Start(parameters, tuple(float(a) for a in amounts), share)
