@@ -175,7 +175,8 @@ def families(left: Unexplained) -> list[FamilyGain]:
     At most one, negative for nothing.
     """
     places = connections(left.base.fit.model)
-    found = [gain for gains in side_by_side(lambda place: _families_at(place, left), places) for gain in gains]
+    every = side_by_side(lambda place: _families_at(place, left, _along_motion(place, left)), places)
+    found = [gain for gains in every for gain in gains]
     return sorted(found, key=lambda f: -f.gain.explained)
 
 
@@ -209,8 +210,7 @@ def _along_motion(place: Place, left: Unexplained) -> dict[str, Floats]:
     return {**_shapes(place, left), "past": left.passed(place, _states(place, left))}
 
 
-def _families_at(place: Place, left: Unexplained, along: Mapping[str, Floats] | None = None) -> list[FamilyGain]:
-    along = _along_motion(place, left) if along is None else along
+def _families_at(place: Place, left: Unexplained, along: Mapping[str, Floats]) -> list[FamilyGain]:
     columns = {**along, "time": left.passed(place, _times(place, left))}
     found = {name: _held_out(left, own) for name, own in columns.items()}
     for name, x in zip(MOTIONS[:2], left.along(place), strict=True):

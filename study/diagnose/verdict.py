@@ -440,7 +440,7 @@ def _ranked_sets(search: SetSearch, rows: Sequence[Ranked], comparison: Comparis
 def _material(
     answer: Ranked, left: float, sets: Sequence[Ranked], search: SetSearch, comparison: Comparison
 ) -> tuple[Ranked, float]:
-    """The set without effects that explain less than what is left beside all, and what is left: they imitate of that.
+    """The set without effects that explain less than is ``left`` beside all, a part of which they imitate; and what is.
 
     Without those as well that explain no more than models of real structures leave, and next to nothing of what is
     unexplained: the others are missing, whatever is missing besides.
