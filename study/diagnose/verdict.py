@@ -347,7 +347,11 @@ def _decide(
     if answer is None or (one.verdict == MISSING and len(answer.entries) == 1):
         return replace(one, ended=search.ended)
     left = one.left if first is not None and answer.fit is first.fit else _left(answer.fit, answer.prediction)
+    whole = answer
     answer, left = _material(answer, left, sets, search, comparison)
+    if answer is not whole and len(answer.entries) > 1 and not work.is_done():
+        sets = _as_simple(answer, search, comparison)
+        answer, left = sets[0], left if sets[0] is answer else _left(sets[0].fit, sets[0].prediction)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
     if verdict == UNKNOWN and first is not None and (unusual or _stands_out(first, comparison.prepared)):
@@ -464,6 +468,21 @@ def _material(
         answer = fewer
         left = _left(answer.fit, answer.prediction)
     return answer, left
+
+
+def _as_simple(answer: Ranked, search: SetSearch, comparison: Comparison) -> list[Ranked]:
+    """A set that others were taken out of, among those of as many effects and no more unknowns that come near it.
+
+    It was the best beside what was taken out; by itself another may be, or one that the record cannot tell from it.
+    """
+    own = search.tried.get(frozenset(answer.names), answer)
+    near = [
+        c
+        for c in search.sets(len(answer.names))
+        if c.unknowns <= answer.unknowns and not c.unphysical and set(c.names) != set(answer.names)
+        and statistics.worse(c.prediction.residual, own.prediction.residual) < K
+    ][:RIVALS]  # fmt: skip
+    return rank([answer, *with_best_settled(near, comparison.prepared)], comparison, len(search.tried))
 
 
 def _necessary(
