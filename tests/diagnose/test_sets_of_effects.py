@@ -91,6 +91,29 @@ def test_an_effect_that_explains_next_to_nothing_goes(monkeypatch: pytest.Monkey
     assert "".join(answer.names) == kept
 
 
+def test_a_set_that_others_were_taken_out_of_is_held_against_those_of_its_size(monkeypatch: pytest.MonkeyPatch):
+    """Only against those that come near it with no more unknowns and are physical; the best of them is the answer."""
+    fitted = {
+        "ab": (0.1, 2, ""), "cb": (0.099, 2, ""), "db": (0.3, 2, ""), "eb": (0.099, 4, ""),
+        "fb": (0.099, 2, "a mass is positive"), "c": (0.1, 1, ""), "abc": (0.05, 3, ""),
+    }  # fmt: skip
+    tried: list[Any] = []
+    for names, (error, unknowns, unphysical) in fitted.items():
+        row = a_set(names, error)
+        row.prediction.residual, row.unknowns, row.unphysical = error, unknowns, unphysical
+        tried.append(row)
+    search: Any = SimpleNamespace(
+        tried={frozenset(row.names): row for row in tried},
+        sets=lambda size: [row for row in tried if len(row.names) == size],
+    )
+    monkeypatch.setattr(verdict.statistics, "worse", lambda one, other: 100.0 * (one - other))
+    monkeypatch.setattr(verdict, "with_best_settled", lambda rows, _: rows)
+    monkeypatch.setattr(verdict, "rank", lambda rows, *_: sorted(rows, key=lambda row: row.prediction.error))
+    comparison: Any = SimpleNamespace(prepared=None)
+    rows = verdict._as_simple(tried[0], search, comparison)
+    assert ["".join(row.names) for row in rows] == ["cb", "ab"]
+
+
 @pytest.mark.parametrize(
     ("sets", "explained", "unphysical", "core"),
     [

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from study.records.excitation import Excitation, force
+from study.records.plan import SHORTEST_PART
 from study.records.record import Record, Sensor, record_of
 from study.records.record_layout import KindOfTest, Layout, laid_out, runs_on
 from study.records.sampling_rate import without_spare_samples
@@ -46,6 +47,30 @@ def test_blocks_of_a_decay_hold_five_periods_of_the_slowest_motion_and_it_runs_o
     assert runs_on(prepared)
     assert len(prepared.record.begins) == 1, "the judged motion begins once"
     assert any("runs on through the other's" in note for note in prepared.notes)
+
+
+def fading(samples: int, shorter: int = 1) -> Record:
+    """A slow decay of one motion, of fewer periods or with fewer samples in each."""
+    along = np.arange(0, samples, shorter)
+    rng = np.random.default_rng(1)
+    motion = np.exp(-2.0 * along / samples) * np.sin(2.0 * np.pi * along / SLOW)
+    noisy = motion + 1e-3 * rng.standard_normal(len(along))
+    return Record(DT * shorter, {"force": np.zeros(len(along)), "displacement": noisy}, name="decay")
+
+
+def test_a_decay_of_few_periods_has_eight_blocks_and_either_part_all_amplitudes():
+    prepared = laid_out([fading(16 * SLOW)], Layout())  # four blocks of four periods would part loud from quiet
+    assert len(prepared.record.stretches) == 8
+    assert np.std(prepared.judged) == pytest.approx(np.exp(-2.0 / 8.0) * np.std(prepared.fitted), rel=0.05)
+    two = laid_out([fading(16 * SLOW), replace(fading(16 * SLOW), name="again")], Layout())
+    assert len(two.record.stretches) == 8, "of both together"
+
+
+def test_no_block_of_a_decay_is_shorter_than_a_part_may_be():
+    record = fading(16 * SLOW, shorter=2)
+    lengths = [len(stretch) for stretch in laid_out([record], Layout()).record.stretches]
+    assert min(lengths) >= SHORTEST_PART
+    assert sum(lengths) > 0.9 * len(record) > 4 * SHORTEST_PART
 
 
 def test_a_decay_that_begins_anew_does_so_in_each_block_of_so_many_periods():
