@@ -349,11 +349,13 @@ def _decide(
     left = one.left if first is not None and answer.fit is first.fit else _left(answer.fit, answer.prediction)
     whole = answer
     answer, left = _material(answer, left, sets, search, comparison)
-    if answer is not whole and len(answer.entries) > 1 and not work.is_done():
-        sets = _as_simple(answer, search, comparison)
-        answer, left = sets[0], left if sets[0] is answer else _left(sets[0].fit, sets[0].prediction)
     good = [answer, *(r for r in sets if r.name in answer.tied_with)]
     verdict = _verdict_on(good, left, comparison.prepared, asked)
+    if verdict == SEVERAL and answer is not whole and not work.is_done():
+        near = _as_simple(answer, search, comparison)
+        if believed(near[0], prediction, own):
+            left = left if near[0].fit is answer.fit else _left(near[0].fit, near[0].prediction)
+            answer, good = near[0], [near[0], *(r for r in near if r.name in near[0].tied_with)]
     if verdict == UNKNOWN and first is not None and (unusual or _stands_out(first, comparison.prepared)):
         first_alone = [first] + [r for r in rows if r is not first]
         return replace(one, verdict=MISSING, rows=first_alone, ended=search.ended)
