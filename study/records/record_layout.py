@@ -31,9 +31,9 @@ from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
-BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours (docs/tool.md)
+BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours; fewer if need be ...
 BLOCKS_OF_STRETCH = 24  # at most
-BLOCKS_OF_DECAY = 8  # in all, at least: in fewer, either part lacks amplitudes that the other has
+FEWEST_BLOCKS = 8  # ... of all stretches together: in fewer blocks either part lacks amplitudes or frequencies that the other has
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
 STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
@@ -270,7 +270,7 @@ def alternating(
     that is judged, so that neither has all the loud ones.
     """
     fit, judge = list[Stretch](), list[Stretch]()
-    least = 2 if anew else max(2, -(-BLOCKS_OF_DECAY // len(stretches)))
+    least = 2 if anew else max(2, -(-FEWEST_BLOCKS // len(stretches)))
     for number, stretch in enumerate(stretches):
         count = max(int(len(stretch) / ((anew or BLOCK_PERIODS) * period_of(stretch, sensors))), least)
         count = max(min(count, len(stretch) // SHORTEST_PART, BLOCKS_OF_STRETCH), 2)
