@@ -31,11 +31,10 @@ from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
-BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours; fewer if need be ...
+BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours; fewer if need be
 BLOCKS_OF_STRETCH = 24  # at most
-FEWEST_BLOCKS = 8  # ... in all: in fewer, either part lacks amplitudes or frequencies that the other has
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
-PIECES = 4  # ... and in how many pieces each part is cut at least
+PIECES = 4  # ... and in how many each part is cut at least: in fewer it lacks amplitudes that the other has
 STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
 OUTRIGHT = 3.0  # ... had taken so many times less
 
@@ -270,7 +269,7 @@ def alternating(
     that is judged, so that neither has all the loud ones.
     """
     fit, judge = list[Stretch](), list[Stretch]()
-    least = 2 if anew else max(2, -(-FEWEST_BLOCKS // len(stretches)))
+    least = 2 if anew else max(2, -(-2 * PIECES // len(stretches)))
     for number, stretch in enumerate(stretches):
         count = max(int(len(stretch) / ((anew or BLOCK_PERIODS) * period_of(stretch, sensors))), least)
         count = max(min(count, len(stretch) // SHORTEST_PART, BLOCKS_OF_STRETCH), 2)

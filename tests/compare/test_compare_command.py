@@ -262,7 +262,10 @@ def test_a_decay_that_is_over_before_the_judged_part_is_not_called_a_model_that_
     u = 0.02 * np.exp(-zeta * omega * t) * (np.cos(turns * t) + zeta * omega / turns * np.sin(turns * t))
     noisy = u + 2e-5 * np.random.default_rng(3).standard_normal(len(t))
     write_csv(Record(1 / 200.0, {"displacement": noisy}, name="decay"), Path("decay.csv"))
-    assert cli.main(["compare", "decay.csv", "--free", "--model", "rig.yaml", "--out", "decay"]) == 0
+    words = ["compare", "decay.csv", "--free", "--model", "rig.yaml"]
+    assert cli.main(words) == 0
+    assert "Most of what is judged is noise" not in capsys.readouterr().out, "either part has some of the motion"
+    assert cli.main([*words, "--fit", "0:600", "--judge", "600:1200", "--out", "decay"]) == 0
     said = capsys.readouterr().out
     assert "which looks like noise" in said
     assert "Most of what is judged is noise" in said

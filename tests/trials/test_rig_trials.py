@@ -74,7 +74,7 @@ def swings() -> Truth:
 
 
 def test_effects_that_are_one_along_a_motion_count_as_one(swings: Truth) -> None:
-    entries = [free(get(name)) for name in ("cubic_damping", "quadratic_stiffness", "cubic_stiffness")]
+    entries = [free(get(name)) for name in ("displacement_damping", "quadratic_stiffness", "cubic_stiffness")]
     assert swings.same(entries[0], "quadratic_damping")
     assert not swings.same(entries[2], "quadratic_damping")
     assert not swings.same(entries[1], "quadratic_damping"), "it is the other one, whatever it looks like"
@@ -90,7 +90,7 @@ def test_effects_that_are_one_along_a_motion_count_as_one(swings: Truth) -> None
 def test_what_is_the_remainder_along_a_motion_is_there_but_need_not_be_named(swings: Truth) -> None:
     hidden, added = "quadratic_stiffness", dict(swings.added)
     truth = replace(swings, added={hidden: added[hidden]}, remainder={"remainder": added["quadratic_damping"]})
-    damping, stiffness, another = (free(get(name)) for name in ("cubic_damping", hidden, "cubic_stiffness"))
+    damping, stiffness, another = (free(get(name)) for name in ("displacement_damping", hidden, "cubic_stiffness"))
     assert truth.found([stiffness, damping]) == (2, 0)
     assert truth.found([stiffness]) == (1, 0)
     assert truth.found([damping]) == (1, 1), "what is hidden is left"
