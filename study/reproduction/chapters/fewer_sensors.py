@@ -28,6 +28,7 @@ from study.equations.terms import get
 from study.figures import page
 from study.figures.labels import term_names
 from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
@@ -72,15 +73,15 @@ def _told(
     # The candidates differ in a term, which asks for no other layout.
     opened, prepared = made_ready([record], opened, Layout())
     tried: list[dict[str, Any]] = []
+    right = fit_model(opened, prepared)
     for effect, place, model in _candidates(without, case.effects):
         hidden = any(t.term.name == effect and t.place.path == place.path for t in truth.terms)
         told = {**about, "effect": effect, "place": "-".join(place.ends), "right": hidden}
-        tried.append({**told, **_judged(model, prepared)})
-    fit = fit_model(opened, prepared)
+        tried.append({**told, **_judged(model, prepared, right if hidden else None)})
     values = [
-        {**about, "parameter": key, "true": truth.numbers()[key], "estimate": fit.estimate[key],
-         "standard_error": fit.estimate.error(key), "note": "" if fit.converged else fit.message}
-        for key in fit.estimate.symbols
+        {**about, "parameter": key, "true": truth.numbers()[key], "estimate": right.estimate[key],
+         "standard_error": right.estimate.error(key), "note": "" if right.converged else right.message}
+        for key in right.estimate.symbols
     ]  # fmt: skip
     return tried, values
 
@@ -109,9 +110,10 @@ def _candidates(without: Model, effects: Sequence[str]) -> Iterator[tuple[str, P
                 yield effect, place, replace(without, terms=(*without.terms, free(get(effect), place)))
 
 
-def _judged(model: Model, prepared: Prepared) -> dict[str, Any]:
+def _judged(model: Model, prepared: Prepared, fit: FreeRunFit | None) -> dict[str, Any]:
+    """What a candidate leaves; ``fit`` is its fit, if there is one."""
     try:
-        found = predict(fit_model(model, prepared), prepared)
+        found = predict(fit or fit_model(model, prepared), prepared)
     except StudyError as error:
         return {"error": np.nan, "floor": np.nan, "note": str(error)}
     return {"error": found.error, "floor": found.floor, "note": ""}
