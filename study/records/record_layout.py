@@ -31,10 +31,10 @@ from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 from study.support.thresholds import TOLERANCE
 
-BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours; fewer if need be
+BLOCK_PERIODS = 5.0  # of the motion, at least: its noise is then hardly that of its neighbours; of a short decay fewer
 BLOCKS_OF_STRETCH = 24  # at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
-PIECES = 4  # ... and in how many each part is cut at least: in fewer it lacks amplitudes that the other has
+PIECES = 4  # ... and in how many each part is cut at least; of a decay, that it lacks no amplitudes of the other
 STOPPED = 0.2  # of its size within 1.5 periods: a motion that no damping brought to rest, where as many before ...
 OUTRIGHT = 3.0  # ... had taken so many times less
 
@@ -137,7 +137,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         ]
         fit, judge = [first for first, _ in halves], [second for _, second in halves]
         if turns:
-            fit, judge = alternating(stretches, sensors, anew)
+            fit, judge = alternating(stretches, sensors, anew, fades=free and not anew)
             notes.append(_said(fit, judge, len(stretches), anew=bool(anew)))
         elif len(stretches) > 1:
             notes.append(f"of each of {len(stretches)} stretches the first half is fitted and the second judged")
@@ -260,16 +260,18 @@ def _unbroken(stretch: Stretch, sensors: Sequence[Sensor]) -> tuple[Stretch, str
 
 
 def alternating(
-    stretches: Sequence[Stretch], sensors: Sequence[Sensor], anew: float = 0.0
+    stretches: Sequence[Stretch], sensors: Sequence[Sensor], anew: float = 0.0, *, fades: bool = False
 ) -> tuple[list[Stretch], list[Stretch]]:
     """Every other block of the stretches to be fitted, and those between them to be judged.
+
+    Of a motion that ``fades`` there are enough of them for either part to have all amplitudes.
 
     Each part has one motion in every stretch, that runs on through the blocks of the other; or it begins ``anew`` in
     each block, of so many periods. Where a stretch before began with a block that is fitted, the next begins with one
     that is judged, so that neither has all the loud ones.
     """
     fit, judge = list[Stretch](), list[Stretch]()
-    least = 2 if anew else max(2, -(-2 * PIECES // len(stretches)))
+    least = max(2, -(-2 * PIECES // len(stretches))) if fades else 2
     for number, stretch in enumerate(stretches):
         count = max(int(len(stretch) / ((anew or BLOCK_PERIODS) * period_of(stretch, sensors))), least)
         count = max(min(count, len(stretch) // SHORTEST_PART, BLOCKS_OF_STRETCH), 2)
