@@ -81,6 +81,9 @@ def fitted_without(fit: FreeRunFit, name: str, prepared: Prepared, start: dict[s
 def compared_without(comparison: Comparison, name: str) -> Comparison:
     """The comparison of the model without one of its terms, all that it does not hold fitted again.
 
+    Of a fit of everything at once, by which terms are asked whether they are needed, and one that holds shape
+    parameters at first, that which leaves less: either may end in a local minimum where the other does not.
+
     Raises
     ------
     StudyError
@@ -93,7 +96,7 @@ def compared_without(comparison: Comparison, name: str) -> Comparison:
     begin = removal(fit, name, linearise(fit, prepared)).start if fit.keys and not fit.restarts else {}
     if len(held) == len(model.values) or model.modal:  # without the term a record may ask for other modes
         return compare(given, prepared)
-    fits = list[FreeRunFit]()
+    fits = list(fitted_without(fit, name, prepared, begin))
     with suppress(StudyError):
         fits.append(best_fit(model, prepared, _starts(model, prepared, begin, held), held))
     if model.named or not fits:
