@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,7 +96,7 @@ def compared_without(comparison: Comparison, name: str) -> Comparison:
     begin = removal(fit, name, linearise(fit, prepared)).start if fit.keys and not fit.restarts else {}
     if len(held) == len(model.values) or model.modal:  # without the term a record may ask for other modes
         return compare(given, prepared)
-    fits = list(fitted_without(fit, name, prepared, begin))
+    fits = list(fitted_without(replace(fit, noise=()), name, prepared, begin))  # weighted anew where it ends
     with suppress(StudyError):
         fits.append(best_fit(model, prepared, _starts(model, prepared, begin, held), held))
     if model.named or not fits:
