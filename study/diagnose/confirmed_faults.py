@@ -109,7 +109,8 @@ def _with_faults(diagnoses: _Diagnoses) -> Diagnosed:
     freed = _with_values_let_go(first, diagnoses.of)
     if freed is not None:
         first, diagnoses.accounted = freed, freed.accounted
-    removable = any(f.corrected and not _plain(f) for f in diagnoses.accounted.faults)
+    told = diagnoses.accounted
+    removable = told.unread is not None or any(f.corrected and not _plain(f) for f in told.faults)
     if removable and not work.is_done() and first.diagnosis.verdict == UNKNOWN:
         first = _without_what_was_corrected(first, diagnoses)
     answer = first.diagnosis.answer
@@ -120,7 +121,7 @@ def _with_faults(diagnoses: _Diagnoses) -> Diagnosed:
 
 def _without_what_was_corrected(first: Diagnosed, diagnoses: _Diagnoses) -> Diagnosed:
     """The diagnosis of the record without what the model alone told of its faults, where something is missing there."""
-    accounted = diagnoses.accounted
+    accounted = diagnoses.accounted.read_as_given()
     other = diagnoses.of(accounted.corrected_for([f for f in accounted.faults if _plain(f)]))
     instead, corrected = other.diagnosis.answer, first.diagnosis.comparison.prediction
     # what leaves no less than the correction by itself is the fault by another name

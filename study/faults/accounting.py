@@ -39,7 +39,7 @@ from study.records.interpolation import BAND_LIMITED, WORDS
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
 from study.support import work
-from study.support.errors import StudyError
+from study.support.errors import DivergenceError, StudyError
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
@@ -63,6 +63,7 @@ class Accounted:
     as_sampled: bool  # whether all samples are used
     put_off: bool = False  # whether faults that a change of a coefficient looks like are yet to be looked for
     operations: int = 0  # that the search for them took
+    unread: Prepared | None = None  # the record as it was given, where the model told that its force is held
 
     @property
     def work_left(self) -> float:
@@ -88,6 +89,10 @@ class Accounted:
         known, off = self.known, self.switched_off
         return _accounted(model, self.given, known, off, FREE_RUN, None, self.as_sampled, changes=True)
 
+    def read_as_given(self) -> "Accounted":
+        """The same of the record with its force read as it was before the model told how."""
+        return self if self.unread is None else replace(self, given=self.unread, unread=None)
+
     def corrected_for(self, faults: Sequence[Fault]) -> "Accounted":
         """The comparison of the same model with the record corrected for other faults."""
         prepared = _needed(self.as_sampled)(corrected(self.given, faults))
@@ -104,6 +109,7 @@ class _Corrected:
     fit: FreeRunFit | None  # of the model to it, where there is one
     given: Prepared  # the record before that, with what is said of it
     put_off: bool = False  # whether only faults were looked for that no change of a coefficient looks like
+    unread: Prepared | None = None  # as ``given``, before its force was read as held
 
 
 def _needed(as_sampled: bool) -> Callable[[Prepared], Prepared]:
@@ -163,7 +169,9 @@ def _accounted(
             comparison = replace(comparison, notes=(*comparison.notes, said))
         operations = work.done()
     off = tuple(switched_off)
-    return Accounted(comparison, found.faults, found.given, known, off, as_sampled, found.put_off, operations)
+    return Accounted(
+        comparison, found.faults, found.given, known, off, as_sampled, found.put_off, operations, found.unread
+    )  # fmt: skip
 
 
 def _corrected(
@@ -219,11 +227,11 @@ def _corrected(
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
         return _Corrected(fewer, end.faults, fit, prepared, put_off)
-    prepared, end = _read_as_held(prepared, end)
-    final = corrected(prepared, end.faults)
+    read, end = _read_as_held(prepared, end)
+    final = corrected(read, end.faults)
     kept = needed(final)
     best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
-    return _Corrected(kept, end.faults, best, prepared, put_off)
+    return _Corrected(kept, end.faults, best, read, put_off, prepared if read is not prepared else None)
 
 
 def _read_as_held(prepared: Prepared, end: SearchEnd) -> tuple[Prepared, SearchEnd]:
@@ -360,7 +368,10 @@ def _begun_late(
     A delay takes a part of what any missing effect leaves: it has to leave less beside the effects too.
     """
     without, less_late = leftover(plain.fit, corrected(prepared, plain.faults)), corrected(prepared, (*faults, late))
-    following = _on_all(fit, less_late)
+    try:
+        following = _on_all(fit, less_late)
+    except DivergenceError:  # what follows a part of the record may run away along all of it
+        return plain
     left = leftover(following, less_late)
     if left is None:
         return plain
