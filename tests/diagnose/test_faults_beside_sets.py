@@ -61,7 +61,8 @@ class Model:
 class Samples:
     """A record that no test asks for more of than how it is read, and how long it is."""
 
-    between = "band-limited"
+    def __init__(self, between: str = "band-limited"):
+        self.between = between
 
     def __len__(self) -> int:
         return 4096
@@ -89,6 +90,10 @@ class Corrected:
         self.asked: list[tuple[str, ...]] = []
         self.otherwise: list[tuple[Fault, ...]] = []  # for what it was corrected in its place
         self.put_off, self.work_left = False, np.inf
+        self.unread: Corrected | None = None  # the record before its force was read as held
+
+    def read_as_given(self) -> "Corrected":
+        return self.unread or self
 
     def faults_beside(self, _fit: Any, model: Model) -> tuple[Fault, ...]:
         self.asked.append(model.names)
@@ -199,6 +204,17 @@ def test_what_was_corrected_may_be_the_motion_that_is_missing(monkeypatch: pytes
     assert record.otherwise[0] == (SPIKES, KNOWN)
     assert found.diagnosis.answer.response_error == 0.05
     assert found.accounted.faults == (SPIKES, KNOWN)
+
+
+def test_a_force_that_the_model_alone_told_to_be_held_may_be_none(monkeypatch: pytest.MonkeyPatch):
+    """A multisine under which friction is missing was read as held, for good, and no effect left noise beside it."""
+    record = Corrected([], beside=[])
+    record.unread, record.comparison = Corrected([], beside=[]), Compared((), record=Samples("held"))
+    found, made = diagnosed(monkeypatch, record, ((), 0.1, 0.0), (SET, 0.0, 0.05))
+    assert made == 2
+    assert record.unread.otherwise == [()]
+    assert not record.otherwise
+    assert found.diagnosis.answer.response_error == 0.05
 
 
 @pytest.mark.parametrize("leaves", [0.05, 0.04])

@@ -11,7 +11,7 @@ from study.equations.model import Model, free
 from study.equations.place import Place
 from study.equations.terms import get
 from study.faults.accounting import Accounted
-from study.faults.fault import ALL_SENSORS, DELAY
+from study.faults.fault import ALL_SENSORS, DELAY, NOTHING_ASKED
 from study.faults.imposed import shifted
 from study.records.record import Record, Sensor, record_of
 from study.way_in.compare_records import compare_records
@@ -62,6 +62,20 @@ def test_a_force_that_is_held_is_told_as_held_and_not_as_a_delay(masses: int) ->
     assert found.comparison.prediction.error == pytest.approx(said.prediction.error, rel=0.01)
     for key, value in said.fit.model.numbers().items():
         assert found.comparison.fit.model.numbers()[key] == pytest.approx(value, rel=1e-3)
+
+
+def test_a_reading_that_a_model_told_is_taken_back_with_what_else_it_told() -> None:
+    """A model that lacks an effect may see a hold where there is none: without what it told the record is as given."""
+    made = record(1)
+    found = compare_records([made], believed(1))
+    given = found.read_as_given()
+    assert given.given.record.between == made.between == "band_limited"
+    assert given.read_as_given() is given
+    plain = compare_records([made], believed(1), settings=NOTHING_ASKED).comparison
+    again = given.corrected_for(()).comparison
+    assert again.record.between == made.between
+    assert again.prediction.error == pytest.approx(plain.prediction.error, rel=1e-6)
+    assert again.prediction.error > 1.5 * found.comparison.prediction.error
 
 
 @pytest.mark.parametrize("masses", [1, 2])

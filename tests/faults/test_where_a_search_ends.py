@@ -9,6 +9,7 @@ from study.faults import accounting, leftover, search
 from study.faults.fault import Fault
 from study.faults.leftover import FittedResidual
 from study.faults.search import SearchEnd, SearchStage, search_faults
+from study.support.errors import DivergenceError
 from study.support.thresholds import TOLERANCE
 
 DRIFT, OFFSET = Fault("drift", "displacement", 1e-3, 1e-5), Fault("offset", "displacement", 1e-3, 1e-5)
@@ -138,6 +139,19 @@ def test_nothing_lies_beneath_what_leaves_noise_alone(monkeypatch, above_noise, 
     plain = SearchEnd((), None, None)
     assert accounting._beneath_too(None, None, fit, (), [("drift", "displacement")], plain) is plain
     assert looked == ["displacement"] * asked
+
+
+def test_what_runs_away_along_all_of_a_record_leaves_the_search_as_it_was(monkeypatch):
+    """A fit that follows the part that was searched, read less late: before, the comparison ended with its sentence."""
+
+    def runs_away(*_):
+        raise DivergenceError("the free run diverges", 0.0)
+
+    monkeypatch.setattr(accounting, "leftover", lambda *_: left(1.0))
+    monkeypatch.setattr(accounting, "corrected", lambda given, _: given)
+    monkeypatch.setattr(accounting, "_on_all", runs_away)
+    plain = SearchEnd((), None, None)
+    assert accounting._begun_late(LATE, None, None, (), ASKED, plain) is plain
 
 
 def test_the_effect_that_explains_most_is_searched_for_once(monkeypatch):
