@@ -1,6 +1,8 @@
 """A ladder: a measured record compared with model after model, each with a term more, judged on what was not fitted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,14 +20,16 @@ from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.equations.variation import Variation, varying
 from study.faults.correction import corrected
-from study.faults.fault import NOTHING_ASKED, Fault, settings_of
+from study.faults.fault import Fault, settings_of
 from study.faults.leftover import leftover
 from study.faults.search import asked_of, refined
 from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
+from study.records.sampling_rate import without_spare_samples
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
-from study.way_in.compare_records import compare_records
+from study.way_in.compare_records import along_the_motion, made_ready
 
 Words = Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]
 LADDER_COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
@@ -59,50 +63,71 @@ def load_ladders(folder: Path, measurements: Mapping[str, Measurement]) -> dict[
 def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame:
     """Errors of every step on the judged samples: relative, in the response's unit, and the noise floor.
 
-    The faults that the ladder names are corrected as the last model has them, for all models alike. A step whose model
-    cannot be fitted has the reason as its note.
+    The faults that the ladder names are corrected as the last model has them, for all models alike. Motions are as long
+    as the first model that can be fitted follows them. A step whose model cannot be fitted has the reason as its note.
     """
     options = list(row.options)
     if ladder.fit:
         options[options.index("--fit") + 1] = ladder.fit
-    model = read_model(Path(row.model))
+    model, entries = read_model(Path(row.model)), [_entry(words) for words in ladder.terms]
     arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
-    layout = layout_of(arguments, records[0])
-    prepared: Prepared | None = None
-    for step in range(len(ladder.terms) + 1):
+    layout, at_step = layout_of(arguments, records[0]), None
+    for step in range(len(entries) + 1):
         about = {"record": row.record, "title": title, "step": step, "added": "", "published": ladder.published}
         if step:
-            entry = _entry(ladder.terms[step - 1])
-            model, about["added"] = model.with_term(entry), entry.name
-        prediction: Prediction | None = None
+            model, about["added"] = model.with_term(entries[step - 1]), entries[step - 1].name
         try:
-            if prepared is None:
-                first = compare_records(records, model, layout, NOTHING_ASKED, absolute=arguments.absolute).comparison
-                prepared = _corrected(first.prepared, ladder, model)
-                prediction = first.prediction if prepared is first.prepared else None
-            if prediction is None:
-                fit = fit_model(with_laid_variations(model, prepared), prepared)
-                prediction = predict(compared_fit(fit, prepared)[0], prepared)
+            if at_step is None:
+                model, prepared = made_ready(records, model, layout, arguments.absolute)
+                prepared = prepared if layout.as_sampled else without_spare_samples(prepared)
+                prepared = _corrected(prepared, ladder.faults, model, entries[step:])
+                at_step = along_the_motion(model, prepared, partial(_fitted, model), lambda one: one.prediction)
+            else:
+                at_step = _fitted(model, at_step.prepared, at_step.fit.model)
         except StudyError as error:
             rows.append({**about, "note": str(error)})
             continue
+        prediction, units = at_step.prediction, at_step.prepared.record.units
         worst = prediction.worst
         rows.append({
-            **about, "error": worst.error, "rms": worst.error * worst.size,
-            "unit": prepared.record.units.get(str(worst.sensor), ""), "floor": prediction.floor, "note": "",
+            **about, "error": worst.error, "rms": worst.error * worst.size, "unit": units.get(str(worst.sensor), ""),
+            "floor": prediction.floor, "note": "",
         })  # fmt: skip
     return pd.DataFrame(rows, columns=LADDER_COLUMNS)
 
 
-def _corrected(prepared: Prepared, ladder: Ladder, model: Model) -> Prepared:
-    """The record without the faults that the ladder names, of the values that they have beside its last model."""
-    if not ladder.faults:
+@dataclass(frozen=True)
+class _Step:
+    """A model of a ladder, fitted, and its motion along what is judged."""
+
+    prepared: Prepared
+    fit: FreeRunFit
+    prediction: Prediction
+
+
+def _fitted(model: Model, prepared: Prepared, below: Model | None = None) -> _Step:
+    """A step of a ladder; its fit begins at the model below, with nothing of what was added.
+
+    Where a term was added that has shape parameters of its own, these are searched for as in any fit.
+    """
+    model = with_laid_variations(model, prepared)
+    known = {} if below is None else below.numbers()
+    opened = [key for key, value in model.values.items() if value is None]
+    if known and not any("." in key and key not in known for key in opened):
+        model = model.with_values({key: known.get(key, 0.0) for key in opened}).opened(model.held_keys)
+    fit, _ = compared_fit(fit_model(model, prepared), prepared)
+    return _Step(prepared, fit, predict(fit, prepared))
+
+
+def _corrected(prepared: Prepared, faults: Sequence[str], model: Model, entries: Sequence[ModelTerm]) -> Prepared:
+    """The record without the faults that a ladder names, of the values that they have beside its last model."""
+    if not faults:
         return prepared
-    for words in ladder.terms:
-        model = model.with_term(_entry(words))
-    left, found = leftover(fit_model(with_laid_variations(model, prepared), prepared), prepared), list[Fault]()
-    for asked in asked_of(prepared, ladder.faults, {}):
+    for entry in entries:
+        model = model.with_term(entry)
+    left, found = leftover(_fitted(model, prepared).fit, prepared), list[Fault]()
+    for asked in asked_of(prepared, faults, {}):
         one = None if left is None else refined(asked, prepared, found, left)
         expect(one is not None, f"{prepared.record.name}: no {' of the '.join(asked)} is found beside the last model")
         if one is not None:

@@ -7,6 +7,7 @@ all come in here.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
@@ -28,6 +29,7 @@ from study.records.sampling_rate import low_passed
 from study.support.errors import StudyError, expect
 from study.support.numbers import enumerated
 
+Made = TypeVar("Made")
 ANEW = 1.5  # periods of a structure's decay in a stretch: a longer run is lost where several effects are missing (docs)
 
 
@@ -175,11 +177,22 @@ def compare_records(
             progress=progress, as_sampled=layout.as_sampled,
         )  # fmt: skip
 
-    found = found_in(prepared)
+    return along_the_motion(model, prepared, found_in, lambda found: found.comparison.prediction)
+
+
+def along_the_motion(
+    model: Model, prepared: Prepared, made: Callable[[Prepared], Made], predicted: Callable[[Made], Prediction]
+) -> Made:  # fmt: skip
+    """What is made of a record along motions as long as a model follows them; ``predicted`` says how it does.
+
+    Of a decay motions run on through its parts; where the model loses its way they begin anew in each, at last every
+    few periods.
+    """
+    found = made(prepared)
     if runs_on(prepared) and (model.states or not model.prescribed):  # what has no state loses no motion
         anew = apart(prepared)
-        while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
-            found = found_in(shorter)
+        while has_lost_its_way(predicted(found)) and (shorter := next(anew, None)) is not None:
+            found = made(shorter)
     return found
 
 
