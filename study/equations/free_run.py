@@ -5,9 +5,11 @@ to the variational equations gives exactly the derivative of the Runge-Kutta map
 of the numbers which the simulation yields, not of an idealisation of them.
 """
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from threading import local
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from study.records.interpolation import between_runs, between_samples_kept, in_c
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.states import angular_rate, starting_states
+from study.support import work
 from study.support.arrays import Floats, Ints
 from study.support.cores import two_at_once
 from study.support.errors import DivergenceError, StudyError, expect
@@ -27,6 +30,7 @@ SHARED = 4096  # steps from which on two threads share the segments; with fewer,
 ROUGH = 0.5  # largest step times the fastest rate
 FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
 LOWEST_BOUND, HIGHEST_BOUND = 4, 32  # steps a sample between which the median rate sets the bound
+MOST_KEPT, LARGEST_KEPT = 4, 1 << 22  # runs of a thread, and bytes of each
 Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
 
@@ -144,21 +148,40 @@ class FreeRun:
         program = self.motion.program.with_inputs({key: values[key] for key in self.keys})
         motion = replace(self.motion, program=program)
         first_free = 1 + len(self.keys)
-        out = np.empty((self.length, len(motion.observed), columns))
         state = np.zeros((len(states), self.states, columns))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
         state[:, range(columns - first_free), range(first_free, columns)] = 1.0
-        if len(states) == 1 or self.samples * self.steps < SHARED:
-            self._integrate(motion, bounds, state, out)
-        else:
-            half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
-            two_at_once(
-                lambda: self._integrate(motion, bounds[half:], state[half:], out),
-                lambda: self._integrate(motion, bounds[: half + 1], state[:half], out),
-            )
+        out, state = self._run(motion, bounds, state)
         if self.places is not None:
             out = out[self.places]
         return out, state[:-1]
+
+    def _run(self, motion: MotionProgram, bounds: tuple[int, ...], state: Floats) -> tuple[Floats, Floats]:
+        """What is observed along all of the motions, and the states in which they arrive.
+
+        A fit ends where one of its last runs was, and what is asked of it first is that run again: a thread keeps its
+        latest.
+        """
+        same = (motion.program.registers.tobytes(), motion.observed.tobytes(), state.tobytes(), state.shape)
+        where = (id(motion.program.code), self.drive.__array_interface__["data"], self.drive.shape, self.drive.strides)
+        key = (*where, *same, self.dt, self.steps, self.starts, bounds)
+        for run in _LATEST.runs:
+            if run.key == key:
+                work.add(run.operations)
+                return run.out.copy(), run.arrived.copy()
+        out = np.empty((self.length, len(motion.observed), state.shape[2]))
+        if len(state) == 1 or self.samples * self.steps < SHARED:
+            operations = self._integrate(motion, bounds, state, out)
+        else:
+            half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
+            operations = sum(two_at_once(
+                lambda: self._integrate(motion, bounds[half:], state[half:], out),
+                lambda: self._integrate(motion, bounds[: half + 1], state[:half], out),
+            ))  # fmt: skip
+        if out.nbytes <= LARGEST_KEPT:
+            held = motion.program.code, self.drive
+            _LATEST.runs.appendleft(_Run(key, held, out.copy(), state.copy(), operations))
+        return out, state
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
         """State at the first sample of each segment, shape (cuts + 1, states), of a motion with fewer restarts.
@@ -172,15 +195,42 @@ class FreeRun:
         self._integrate(motion, (*firsts[anew].tolist(), self.samples), state, out)
         return out[self.along(firsts.tolist()), :, 0]
 
-    def _integrate(self, motion: MotionProgram, cuts: Sequence[int], states: Floats, out: Floats) -> None:
-        """What is observed, and derivatives, into ``out``; ``states`` become those at which the next segments begin."""
+    def _integrate(self, motion: MotionProgram, cuts: Sequence[int], states: Floats, out: Floats) -> int:
+        """What is observed, and derivatives, into ``out``; ``states`` become those at which the next segments begin.
+
+        Returns how many operations it took.
+        """
         bounds = np.array(self.along(cuts), dtype=np.int64)
         starts = self.times(bounds[:-1])
         method = kernels.Method.SUMMED if motion.dofs else kernels.Method.ONE_BY_ONE  # as before, to the last bit
-        failed = kernels.integrate(motion, starts, self.dt, self.steps, self.drive, bounds, states, out, method)
+        failed, operations = kernels.integrate(
+            motion, starts, self.dt, self.steps, self.drive, bounds, states, out, method
+        )
         if failed >= 0:
             time = float(self.times(np.array([failed]))[0])
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
+        return operations
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run that a thread keeps; what it is told by the place of is held, so that nothing else comes to lie there."""
+
+    key: tuple[object, ...]
+    held: tuple[Ints, Floats]
+    out: Floats
+    arrived: Floats
+    operations: int
+
+
+class _Latest(local):
+    """The latest runs of each thread."""
+
+    def __init__(self) -> None:
+        self.runs: deque[_Run] = deque(maxlen=MOST_KEPT)
+
+
+_LATEST = _Latest()
 
 
 def prepare(

@@ -81,13 +81,14 @@ def evaluate(program: Program, columns: Mapping[str, Floats], samples: int) -> F
 def integrate(
     motion: "MotionProgram", starts: Floats, dt: float, steps: int, drive: Floats, bounds: Ints, states: Floats,
     out: Floats, method: Method = Method.SUMMED,
-) -> int:  # fmt: skip
-    """Motions with their exact derivatives, one between each two neighbouring ``bounds``; -1, or what is not finite.
+) -> tuple[int, int]:  # fmt: skip
+    """Motions with their exact derivatives, one between each two neighbouring ``bounds``.
 
-    That is the first such sample. Each motion begins at its time in ``starts`` from its own of the ``states``, shape
-    (motions, states, 1 + derivatives), which become those where it ends: at the first sample of the next. ``drive``
-    has two rows a step, of which there are ``steps`` a sample. ``out``, shape (samples, observed, 1 + derivatives),
-    gets what the program observes; the sample at the last bound is left to whoever integrates on.
+    Returns the first sample that is not finite, -1 where all are, and how many operations it took. Each motion begins
+    at its time in ``starts`` from its own of the ``states``, shape (motions, states, 1 + derivatives), which become
+    those where it ends: at the first sample of the next. ``drive`` has two rows a step, of which there are ``steps`` a
+    sample. ``out``, shape (samples, observed, 1 + derivatives), gets what the program observes; the sample at the last
+    bound is left to whoever integrates on.
     """
     p, drive = motion.program, np.ascontiguousarray(drive, dtype=np.float64)
     fits = states.shape[1:] == (motion.states, out.shape[2]) and len(states) == len(starts) == len(bounds) - 1
@@ -106,7 +107,7 @@ def integrate(
         )
     )  # fmt: skip
     work.add(int(done[0]))
-    return failed
+    return failed, int(done[0])
 
 
 def _at(array: Ints | Floats) -> int:

@@ -109,7 +109,7 @@ def simulate(
     state = np.zeros((1, motion.states, 1))
     state[0, : len(initial), 0] = initial
     out = np.empty((count, len(wanted), 1))
-    failed = kernels.integrate(
+    failed, _ = kernels.integrate(
         motion, np.array([start]), dt, steps, drive, np.array([0, count]), state, out, METHODS[integrator.method]
     )
     if failed >= 0:

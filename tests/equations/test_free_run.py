@@ -13,6 +13,7 @@ from study.equations.place import Place
 from study.equations.terms import LIBRARY, get
 from study.records.outputs import alone
 from study.records.record import MOTIONS, Record, Sensor
+from study.support import work
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -170,6 +171,32 @@ def test_pieces_are_free_runs_of_their_own(systems: dict[str, Model], records: d
     assert not np.any(jacobian[:100, len(values) + 2 :])
     with pytest.raises(StudyError, match="2 initial states were given; 3 segments need one each"):
         run.respond(values, states[:2])
+
+
+def test_the_latest_runs_of_a_thread_are_kept(
+    systems: dict[str, Model], records: dict[str, Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, record, runs = systems["duffing"], records["duffing"], list[FreeRun]()
+    made = FreeRun._integrate  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(FreeRun, "_integrate", lambda run, *told: runs.append(run) or made(run, *told))
+
+    def respond(begin: float, span: tuple[int, int] = (0, 2000), steps: int = 2) -> tuple[Floats, Floats, int]:
+        run = prepare(model, record, tuple(model.values), span=span, steps_per_sample=steps)
+        with work.limited_to(1.0):
+            return *run.respond(numbers(model), (begin, 0.0), 2), work.done()
+
+    first, slopes, operations = respond(0.001)
+    slopes *= 2.0  # whoever gets a run may write to it
+    again, same, counted = respond(0.001)
+    assert len(runs) == 1
+    assert counted == operations > 0  # where a search ends does not turn on what was kept
+    np.testing.assert_array_equal(again, first)
+    np.testing.assert_array_equal(2.0 * same, slopes)
+    for other in (respond(0.002), respond(0.001, steps=4), respond(0.001, (10, 2010)), respond(0.001, (0, 1990))):
+        assert len(other[0]) != len(first) or not np.array_equal(other[0], first)
+    assert len(runs) == 5
+    respond(0.001)
+    assert len(runs) == 6  # four have been made since
 
 
 def central_differences_of_a_state(run: FreeRun, values: dict[str, float], states: Floats) -> Floats:

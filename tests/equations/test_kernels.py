@@ -43,7 +43,7 @@ def test_arrays_that_do_not_fit_are_refused(systems: dict[str, Model]) -> None:
         kernels.evaluate(product(), {"a": np.zeros(4), "b": np.zeros(5)}, 5)
     motion, start, bounds = motion_program(systems["linear"], (), ()), np.zeros(1), np.array([0, 5])
     drive, states, out = np.zeros((17, 1)), np.zeros((1, 2, 1)), np.empty((5, 0, 1))
-    assert kernels.integrate(motion, start, 0.1, 2, drive, bounds, states, out) == -1
+    assert kernels.integrate(motion, start, 0.1, 2, drive, bounds, states, out)[0] == -1
     wrong = [
         (start, drive[:16], bounds, states, out), (start, drive, bounds, states[:, :1], out),
         (start, drive, np.array([0, 6]), states, out), (np.zeros(2), drive, bounds, states, out),
