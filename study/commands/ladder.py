@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,7 +29,7 @@ from study.records.prepared import Prepared
 from study.records.sampling_rate import without_spare_samples
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
-from study.way_in.compare_records import along_the_motion, made_ready
+from study.way_in.compare_records import as_far_as_it_follows, made_ready
 
 Words = Annotated[tuple[str, ...], BeforeValidator(lambda c: c.split() if isinstance(c, str) else c)]
 LADDER_COLUMNS = ["record", "title", "step", "added", "error", "rms", "unit", "floor", "published", "note"]
@@ -81,8 +81,8 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             if at_step is None:
                 model, prepared = made_ready(records, model, layout, arguments.absolute)
                 prepared = prepared if layout.as_sampled else without_spare_samples(prepared)
-                prepared = _corrected(prepared, ladder.faults, model, entries[step:])
-                at_step = along_the_motion(model, prepared, partial(_fitted, model), lambda one: one.prediction)
+                prepared = _corrected(prepared, ladder.faults, reduce(Model.with_term, entries[step:], model))
+                at_step = as_far_as_it_follows(model, prepared, partial(_fitted, model), lambda one: one.prediction)
             else:
                 at_step = _fitted(model, at_step.prepared, at_step.fit.model)
         except StudyError as error:
@@ -120,13 +120,11 @@ def _fitted(model: Model, prepared: Prepared, below: Model | None = None) -> _St
     return _Step(prepared, fit, predict(fit, prepared))
 
 
-def _corrected(prepared: Prepared, faults: Sequence[str], model: Model, entries: Sequence[ModelTerm]) -> Prepared:
+def _corrected(prepared: Prepared, faults: Sequence[str], last: Model) -> Prepared:
     """The record without the faults that a ladder names, of the values that they have beside its last model."""
     if not faults:
         return prepared
-    for entry in entries:
-        model = model.with_term(entry)
-    left, found = leftover(_fitted(model, prepared).fit, prepared), list[Fault]()
+    left, found = leftover(_fitted(last, prepared).fit, prepared), list[Fault]()
     for asked in asked_of(prepared, faults, {}):
         one = None if left is None else refined(asked, prepared, found, left)
         expect(one is not None, f"{prepared.record.name}: no {' of the '.join(asked)} is found beside the last model")

@@ -30,7 +30,6 @@ SHARED = 4096  # steps from which on two threads share the segments; with fewer,
 ROUGH = 0.5  # largest step times the fastest rate
 FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
 LOWEST_BOUND, HIGHEST_BOUND = 4, 32  # steps a sample between which the median rate sets the bound
-MOST_KEPT, LARGEST_KEPT = 4, 1 << 22  # runs of a thread, and bytes of each
 Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
 
@@ -178,9 +177,7 @@ class FreeRun:
                 lambda: self._integrate(motion, bounds[half:], state[half:], out),
                 lambda: self._integrate(motion, bounds[: half + 1], state[:half], out),
             ))  # fmt: skip
-        if out.nbytes <= LARGEST_KEPT:
-            held = motion.program.code, self.drive
-            _LATEST.runs.appendleft(_Run(key, held, out.copy(), state.copy(), operations))
+        _LATEST.keep(_Run(key, (motion.program.code, self.drive), out, state, operations))
         return out, state
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
@@ -224,10 +221,15 @@ class _Run:
 
 
 class _Latest(local):
-    """The latest runs of each thread."""
+    """The latest runs of each thread, but no long ones."""
 
     def __init__(self) -> None:
-        self.runs: deque[_Run] = deque(maxlen=MOST_KEPT)
+        self.runs: deque[_Run] = deque(maxlen=4)
+
+    def keep(self, run: _Run) -> None:
+        """Keep a run, whose arrays stay their owner's."""
+        if run.out.nbytes <= 1 << 22:
+            self.runs.appendleft(replace(run, out=run.out.copy(), arrived=run.arrived.copy()))
 
 
 _LATEST = _Latest()

@@ -177,10 +177,10 @@ def compare_records(
             progress=progress, as_sampled=layout.as_sampled,
         )  # fmt: skip
 
-    return along_the_motion(model, prepared, found_in, lambda found: found.comparison.prediction)
+    return as_far_as_it_follows(model, prepared, found_in, lambda found: found.comparison.prediction)
 
 
-def along_the_motion(
+def as_far_as_it_follows(
     model: Model, prepared: Prepared, made: Callable[[Prepared], Made], predicted: Callable[[Made], Prediction]
 ) -> Made:  # fmt: skip
     """What is made of a record along motions as long as a model follows them; ``predicted`` says how it does.

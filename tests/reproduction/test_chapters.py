@@ -1,6 +1,7 @@
 """Part II: settings and claims, theory against records, small chapters from settings to verdicts, the page."""
 
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,11 @@ import pandas as pd
 import pytest
 
 from study.commands import ladder as ladder_module
-from study.commands.ladder import Ladder, climbed_ladder, load_ladders, missing_ladder
+from study.commands.ladder import climbed_ladder, load_ladders, missing_ladder
 from study.commands.measurements import load_measurements
+from study.equations.model import Model
 from study.equations.model_file import read_model
+from study.equations.terms import get
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.frequency_domain.noisy_inputs import expected_spectra
 from study.records.excitation import displacement_noise
@@ -203,16 +206,24 @@ def test_a_ladder_corrects_the_faults_that_it_names_of_the_values_that_its_last_
     given, offset = prepare_record(made.record), made.fault["value"]
     off = {}
     for terms in ((), ("quadratic_stiffness",)):
-        ladder = Ladder(record="x", terms=terms, fit="", faults=("offset",), published="x")
-        corrected = ladder_module._corrected(given, ladder, made.believed)
+        last = reduce(Model.with_term, map(get, terms), made.believed)
+        corrected = ladder_module._corrected(given, ("offset",), last)
         removed = given.record["displacement"] - corrected.record["displacement"]
         assert np.ptp(removed) < 1e-12
         off[terms] = abs(float(np.mean(removed)) / offset - 1.0)
     assert off["quadratic_stiffness",] < 0.05 < off[()]
-    assert (
-        ladder_module._corrected(given, Ladder(record="x", terms=(), fit="", faults=(), published="x"), made.believed)
-        is given
-    )
+    assert ladder_module._corrected(given, (), made.believed) is given
+
+
+def test_a_step_of_a_ladder_begins_where_the_one_below_ended(monkeypatch):
+    made, begun = make_trial(560_001, ("quadratic_stiffness",), 1e-4, "displacement", "none", DRIVEN_MASS), []
+    prepared, fit = prepare_record(made.record), ladder_module.fit_model
+    monkeypatch.setattr(ladder_module, "fit_model", lambda model, part: begun.append(model) or fit(model, part))
+    first = ladder_module._fitted(made.believed, prepared)
+    second = ladder_module._fitted(made.believed.with_term(get("quadratic_stiffness")), prepared, first.fit.model)
+    ladder_module._fitted(made.believed.with_term(get("dead_band")), prepared, first.fit.model)
+    assert [model.starts for model in begun] == [{}, {**first.fit.model.numbers(), "k2": 0.0}, {}]
+    assert second.prediction.worst.error < 0.5 * first.prediction.worst.error
 
 
 @needs("friction_damper")
