@@ -187,11 +187,12 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
         return
     taper, products = cut.taper(), np.zeros_like(total)
     views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
-    room = np.empty((len(views), CHUNK, cut.length))  # reused: fresh memory costs as much as a transform
-    transformed = np.empty((len(views), CHUNK, len(total)), dtype=np.complex128)
-    turned = np.empty((len(total), len(views), CHUNK), dtype=np.complex128)
-    for first in range(0, count, CHUNK):
-        size = min(CHUNK, count - first)
+    most = min(CHUNK, count)
+    room = np.empty((len(views), most, cut.length))  # reused: fresh memory costs as much as a transform
+    transformed = np.empty((len(views), most, len(total)), dtype=np.complex128)
+    turned = np.empty((len(total), len(views), most), dtype=np.complex128)
+    for first in range(0, count, most):
+        size = min(most, count - first)
         tapered, lines = room[:, :size], turned[..., :size]
         for view, out in zip(views, tapered, strict=True):
             np.multiply(view[first : first + size], taper, out=out)
