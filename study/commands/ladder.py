@@ -79,10 +79,11 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
             model, about["added"] = model.with_term(entries[step - 1]), entries[step - 1].name
         try:
             if at_step is None:
-                model, prepared = made_ready(records, model, layout, arguments.absolute)
+                ready, prepared = made_ready(records, model, layout, arguments.absolute)
                 prepared = prepared if layout.as_sampled else without_spare_samples(prepared)
-                prepared = _corrected(prepared, ladder.faults, reduce(Model.with_term, entries[step:], model))
-                at_step = as_far_as_it_follows(model, prepared, partial(_fitted, model), lambda one: one.prediction)
+                prepared = _corrected(prepared, ladder.faults, reduce(Model.with_term, entries[step:], ready))
+                at_step = as_far_as_it_follows(ready, prepared, partial(_fitted, ready), lambda one: one.prediction)
+                model = ready
             else:
                 at_step = _fitted(model, at_step.prepared, at_step.fit.model)
         except StudyError as error:

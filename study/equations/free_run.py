@@ -227,8 +227,9 @@ class _Latest(local):
         self.runs: deque[_Run] = deque(maxlen=4)
 
     def keep(self, run: _Run) -> None:
-        """Keep a run, whose arrays stay their owner's."""
-        if run.out.nbytes <= 1 << 22:
+        """Keep a run, whose arrays stay their owner's; with it stays all of what drives, of which it may be a part."""
+        drive = run.held[1]
+        if run.out.nbytes + (drive if drive.base is None else drive.base).nbytes <= 1 << 23:
             self.runs.appendleft(replace(run, out=run.out.copy(), arrived=run.arrived.copy()))
 
 

@@ -180,7 +180,9 @@ def test_the_latest_runs_of_a_thread_are_kept(
     made = FreeRun._integrate  # pyright: ignore[reportPrivateUsage]
     monkeypatch.setattr(FreeRun, "_integrate", lambda run, *told: runs.append(run) or made(run, *told))
 
-    def respond(begin: float, span: tuple[int, int] = (0, 2000), steps: int = 2) -> tuple[Floats, Floats, int]:
+    def respond(
+        begin: float, span: tuple[int, int] = (0, 2000), steps: int = 2, record: Record = record
+    ) -> tuple[Floats, Floats, int]:
         run = prepare(model, record, tuple(model.values), span=span, steps_per_sample=steps)
         with work.limited_to(1.0):
             return *run.respond(numbers(model), (begin, 0.0), 2), work.done()
@@ -197,6 +199,10 @@ def test_the_latest_runs_of_a_thread_are_kept(
     assert len(runs) == 5
     respond(0.001)
     assert len(runs) == 6  # four have been made since
+    long = Record(DT, {"force": np.zeros(1 << 18)})  # whose force would stay with the run
+    for _ in range(2):
+        respond(0.001, record=long)
+    assert len(runs) == 8
 
 
 def central_differences_of_a_state(run: FreeRun, values: dict[str, float], states: Floats) -> Floats:
