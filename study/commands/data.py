@@ -9,7 +9,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", help="record to look for, and to fetch if it is missing (default: list all)")
     parser.add_argument(
         "--address", default="",
-        help="address of the file, or of a folder with the record's files under their names; checksums are verified",
+        help="address of the file, or of a folder with the record's files under their names (default: the public one); "
+        "checksums are verified",
     )  # fmt: skip
 
 
@@ -38,7 +39,8 @@ def listing() -> str:
         states = {state_of(folder / name / file.name, file) for file in record.files}
         state = "there" if states == {"there"} else "differs" if "differs" in states else "missing"
         count = f"{len(record.files)} file{'s' if len(record.files) > 1 else ''}, {record.size / 1e6:.1f} MB"
-        rows.append([name, f"{record.title}: {record.source}", record.licence, count, state, record.by_hand])
+        fetched = f"study data {name}, or " if all(file.address for file in record.files) else ""
+        rows.append([name, f"{record.title}: {record.source}", record.licence, count, state, fetched + record.by_hand])
     head = ["record", "what", "licence", "size", "is", "where to get it"]
     table = tabulate(rows, head, tablefmt="simple", maxcolwidths=[None, 34, 22, None, None, 36])
     return f"{table}\n\nRecords are looked for in {folder}, which STUDY_DATA may name; none is part of the project."

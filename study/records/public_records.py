@@ -1,9 +1,9 @@
 """The public records that docs, gallery and notebooks use: whose they are, what may be done with them, where they go.
 
 None is part of the project. A checksum is that of the very file that was used here. Where that is the original, it
-holds for a download; where the original was converted to CSV or thinned, it tells whether the same was made of it. No
-address of a single file is known to stay, so that none is written down: an entry says where its page is, and
-``study data NAME --address`` fetches a file from an address that the user found there.
+holds for a download, from an address that stays: of a file in one state of a repository. Where the original was
+converted to CSV or thinned, it tells whether the same was made of it; no address has those bytes, and an entry says
+where its page is. ``study data NAME --address`` fetches a file from an address that the user has.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ class PublicFile:
     name: str
     size: int  # bytes
     sha256: str
-    original: bool = False  # as it is offered; else it was converted from that
+    address: str = ""  # of the file as it is offered; none where it was converted from that
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ RECORDS: Mapping[str, PublicRecord] = {
         (
             PublicFile(
                 "SNLS80mV.mat", 2097520, "5c7413a52255af0cb4e2f93fb6903beb92b08965ba1e6ad0a6ffedfed8477ed4",
-                original=True,
+                "https://raw.githubusercontent.com/antonior92/sysid-neuralnet/8da23c9810f738aececa6058a53e40e9a621e5bc/"
+                "data/SilverboxFiles/SNLS80mV.mat",
             ),
         ),
     ),
@@ -158,7 +159,8 @@ def fetch(name: str, folder: Path, address: str = "") -> list[Path]:
     folder : Path
         That of all records.
     address : str
-        Of the file, or of the folder that holds the files by their names.
+        Of the file, or of the folder that holds the files by their names; where that is left out, the public address of
+        each file, if it has one.
 
     Raises
     ------
@@ -176,9 +178,12 @@ def fetch(name: str, folder: Path, address: str = "") -> list[Path]:
                 "move it away",
             )
             by_hand = f"get it by hand ({record.by_hand}) and put it at {path}"
-            made = "" if file.original else "; it was converted from what is offered there (docs/reproduction.md)"
-            expect(bool(address), f"no address of {file.name} is known that stays; {by_hand}{made}")
-            _retrieve(address if len(record.files) == 1 else f"{address.rstrip('/')}/{file.name}", path, file, by_hand)
+            given = address if len(record.files) == 1 else address and f"{address.rstrip('/')}/{file.name}"
+            expect(
+                bool(given or file.address),
+                f"no address has {file.name}, converted from what is offered (docs/reproduction.md); {by_hand}",
+            )
+            _retrieve(given or file.address, path, file, by_hand)
         paths.append(path)
     return paths
 

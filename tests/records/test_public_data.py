@@ -39,7 +39,7 @@ def server(tmp_path):
 @pytest.fixture
 def rig(monkeypatch):
     """A record of two files and one of a single file, whose checksums are right."""
-    files = tuple(PublicFile(n, len(c), hashlib.sha256(c).hexdigest(), original=True) for n, c in CONTENT.items())
+    files = tuple(PublicFile(n, len(c), hashlib.sha256(c).hexdigest()) for n, c in CONTENT.items())
     records = {
         "rig": PublicRecord("Rig", "nobody", "MIT", "the shelf", files),
         "alone": PublicRecord("Alone", "nobody", "MIT", "the shelf", files[:1]),
@@ -53,6 +53,16 @@ def test_files_are_fetched_once_and_verified(server, tmp_path):
     assert [path.read_bytes() for path in paths] == list(CONTENT.values())
     assert fetch("rig", tmp_path / "data") == paths, "what is there is not asked for again"
     assert fetch("alone", tmp_path / "data", f"{server}/one.csv")[0].read_bytes() == CONTENT["one.csv"]
+
+
+@pytest.mark.usefixtures("rig")
+def test_a_file_has_a_public_address_or_was_converted(server, tmp_path, monkeypatch):
+    content = CONTENT["one.csv"]
+    file = PublicFile("one.csv", len(content), hashlib.sha256(content).hexdigest(), address=f"{server}/one.csv")
+    monkeypatch.setitem(public_records.RECORDS, "offered", PublicRecord("Offered", "nobody", "MIT", "a shelf", (file,)))
+    assert fetch("offered", tmp_path)[0].read_bytes() == content
+    with pytest.raises(StudyError, match=r"no address has one.csv, converted.*by hand .the shelf."):
+        fetch("alone", tmp_path)
 
 
 @pytest.mark.usefixtures("rig")
