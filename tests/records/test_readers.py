@@ -205,9 +205,14 @@ def test_printed_times_give_the_rate_they_were_made_with(fs: float, tmp_path: Pa
 
 def test_jitter_below_one_percent_is_even(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
-    jitter = 0.02 * 0.008 * RNG.uniform(-1, 1, 40)
-    path.write_text("time,force,displacement\n" + rows(",", ".", TIME + jitter, FORCE, DISPLACEMENT))
-    assert read_record(path).dt == pytest.approx(0.02, rel=1e-3)
+    ends = np.array([-1.0, *np.tile([1.0, -1.0], 19), 1.0])  # the line through the first and the last leaves the others
+    for shares in (RNG.uniform(-1, 1, 40), ends):
+        jitter = 0.02 * 0.008 * shares
+        path.write_text("time,force,displacement\n" + rows(",", ".", TIME + jitter, FORCE, DISPLACEMENT))
+        assert read_record(path).dt == pytest.approx(0.02, rel=1e-3)
+    path.write_text("time,force,displacement\n" + rows(",", ".", TIME + 0.02 * 0.02 * ends, FORCE, DISPLACEMENT))
+    with pytest.raises(StudyError, match="sampling is uneven"):
+        read_record(path)
 
 
 def test_times_in_milliseconds(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -121,7 +122,10 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
     grid = np.arange(len(time), dtype=np.float64)
     away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
     rounding = _rounding(time)
-    if away > max(JITTER * mean, min(rounding, COARSEST_ROUNDING * mean)):
+    allowed = max(JITTER * mean, min(rounding, COARSEST_ROUNDING * mean))
+    if away > allowed:  # both ends may be off
+        mean, away = _nearest_line(time, mean, away)
+    if away > allowed:
         usual, widest = float(np.median(steps)), int(np.argmax(steps))
         worst = int(np.argmax(np.abs(steps - usual)))
         how = f"sampling is uneven ({usual:.6g} s usually, {steps[worst]:.6g} s before {place(worst + 1)})"
@@ -134,6 +138,21 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
         return exact, float(time[0])
     slack = (2.0 * away + rounding) / (len(time) - 1)
     return shortest_decimal(mean, slack), float(time[0])
+
+
+def _nearest_line(time: Floats, slope: float, away: float) -> tuple[float, float]:
+    """Slope of the line that times by their number leave least at most, and how far they do; begun at one beside it.
+
+    How far they do is convex in the slope, and a line that leaves them by no more has about that slope.
+    """
+    from scipy.optimize import minimize_scalar
+
+    grid, reach = np.arange(len(time), dtype=np.float64), 4.0 * away / (len(time) - 1)
+    found: Any = minimize_scalar(
+        lambda tried: 0.5 * float(np.ptp(time - tried * grid)), bounds=(slope - reach, slope + reach), method="bounded",
+        options={"xatol": 1e-6 * reach},
+    )  # fmt: skip
+    return float(found.x), float(found.fun)
 
 
 def shortest_decimal(interval: float, slack: float) -> float:
