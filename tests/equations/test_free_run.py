@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from study.equations import kernels
 from study.equations.free_run import FreeRun, predict_response, prepare
-from study.equations.model import Model, ModelTerm
+from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
-from study.equations.terms import LIBRARY, get
+from study.equations.terms import LIBRARY, custom, get
 from study.records.outputs import alone
-from study.records.record import MOTIONS, Record, Sensor
+from study.records.record import FORCE, MOTIONS, Record, Sensor
 from study.support import work
 from study.support.errors import StudyError
 
@@ -203,6 +204,61 @@ def test_the_latest_runs_of_a_thread_are_kept(
     for _ in range(2):
         respond(0.001, record=long)
     assert len(runs) == 8
+
+
+EVERY_OPERATION = (
+    "sin(u)*cos(v) + exp(-v*v)*log(1 + u*u) + sqrt(abs(u)) + tanh(v) + max(u, v)*min(u, v) - sgn(u)/(2 + v*v)"
+    " + max(0.01 + u*u, 0)**1.5"
+)
+
+
+@pytest.mark.parametrize("name", [*EFFECTS, "every operation", "two masses", "a moved end"])
+@pytest.mark.parametrize("columns", ["value", "all", "more than at once"])
+def test_two_motions_at_once_are_those_of_one_after_the_other(
+    name: str, columns: str, make_model: Make, report_force: Floats
+) -> None:
+    """To the last bit, with as many operations, and failing where the first of them would have."""
+    if name in EFFECTS:
+        model = with_effect(make_model, name)
+    else:
+        model = make_model(name, LINEAR).with_term(free(custom("own", EVERY_OPERATION)).with_values({"q_own": 2.0}))
+    if name in ("two masses", "a moved end"):
+        ends = tuple(replace(t, place=Place("at", (end,))) for t in model.terms for end in ("first", "second"))
+        tied = ModelTerm(get("cubic_stiffness"), (1e7,), (), Place("between", ("first", "second")))
+        model = Model("two", (*ends, tied), ("first", "second"), (("force", "second"),))
+    keys = tuple(model.values) if columns != "value" else ()
+    sensors = [Sensor(c, motion) for c in model.coordinates for motion in (MOTIONS[0], MOTIONS[2])]
+    channels = {"force": report_force[:400]}
+    if name == "a moved end":  # the force there is computed for what is observed alone
+        model, keys = replace(model, terms=model.terms[1:]), tuple(key for key in keys if key != "m[first]")
+        sensors = [Sensor("first", FORCE), sensors[2]]
+        channels |= {str(Sensor("first", motion)): 0.01 * report_force[400:800] for motion in MOTIONS}
+    run = prepare(model, Record(DT, channels), keys, sensors=sensors, restarts=(60, 121, 260, 262))
+    known = run.motion.program.with_inputs({key: numbers(model)[key] for key in keys})
+    motion = replace(run.motion, program=known)
+    assert (motion.split < len(known.code)) == (name == "a moved end")
+    bounds, begins = np.array([0, *run.cuts, 400]), run.times(np.array([0, *run.cuts]))
+    states = np.zeros((5, run.states, 1 + len(keys) + 9 * (columns == "more than at once")))
+    states[:, :, 0] = np.random.default_rng(3).normal(0.0, 0.003, (5, run.states))
+
+    def integrated(begun: Floats, each: bool) -> tuple[int, int, bytes, bytes]:
+        out, arrived, operations, failed = np.zeros((400, len(sensors), states.shape[2])), begun.copy(), 0, -1
+        for i in range(5) if each else [0]:
+            part, own = slice(i, i + 1 if each else None), arrived[i : i + 1] if each else arrived
+            ends = bounds[i : i + 2] if each else bounds
+            failed, made = kernels.integrate(motion, begins[part], DT, 2, run.drive, ends, own, out)
+            operations += made
+            if failed >= 0:
+                return failed, operations, b"", b""
+        return failed, operations, out.tobytes(), arrived.tobytes()
+
+    assert (found := integrated(states, each=False)) == integrated(states, each=True)
+    assert found[0] == -1
+    for lost in range(5):  # where a motion runs away, or is nothing to begin with
+        away = states.copy()
+        away[lost:, 0, 0] = np.nan
+        assert (found := integrated(away, each=False)) == integrated(away, each=True)
+        assert found[0] >= 0
 
 
 def central_differences_of_a_state(run: FreeRun, values: dict[str, float], states: Floats) -> Floats:

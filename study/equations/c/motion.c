@@ -3,18 +3,16 @@
  * the p are those of the initial state. Runge-Kutta applied to them gives exactly the derivative of its own map.
  */
 
-#include "motion.h"
+#include "two_motions.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define FAR 1e150 /* whose square is still a number, its cube is not */
 enum { SUMMED, ONE_BY_ONE, ADAMS }; /* methods, as in kernels.py */
-enum { WIDEST = 12 };               /* columns at once, which a processor keeps in its registers */
 #define EACH_WIDTH(DO) DO(2) DO(4) DO(6) DO(8) DO(10) DO(12)
 
-static const double ZERO = 0.0;
+const double NO_DERIVATIVE = 0.0;
 
 /*
  * Where a motion dies away its derivatives fall below 1e-308, where a number has no full mantissa any more and an
@@ -47,21 +45,8 @@ static void set_rounding(Rounding mode) { (void)mode; }
  * it in the processor's registers. A wider row is treated in parts. A pair of columns is one operation: left to itself
  * a compiler sees that of some rows, and not of others.
  */
-#if defined(__GNUC__)
-typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
-static inline Pair pair(double first, double second) { return (Pair){first, second}; }
-static inline Pair plus(Pair a, double by, Pair b) { return a + pair(by, by) * b; }
-static inline double first_of(Pair a) { return a[0]; }
-static inline Pair with_first(Pair a, double first) { return pair(first, a[1]); }
-#else
-typedef struct {
-    double first, second;
-} Pair;
-static inline Pair pair(double first, double second) { return (Pair){first, second}; }
-static inline Pair plus(Pair a, double by, Pair b) { return pair(a.first + by * b.first, a.second + by * b.second); }
-static inline double first_of(Pair a) { return a.first; }
-static inline Pair with_first(Pair a, double first) { return pair(first, a.second); }
-#endif
+static inline Pair plus(Pair a, double by, Pair b) { return plus_product(a, pair(by, by), b); }
+static inline Pair with_first(Pair a, double first) { return pair(first, second_of(a)); }
 
 static inline double *register_of(const Motion *m, int64_t state) { return m->program.r + 1 + m->drives + state; }
 
@@ -255,14 +240,15 @@ int observe(Motion *m, const int64_t *observed, int64_t count, double *out) {
     return 1;
 }
 
+/* From the `first` sample on, at which the state is that of `m`. */
 static int64_t along_runge_kutta(
     Motion *m, double start, double dt, int64_t steps, const double *drive, const int64_t *observed, int64_t count,
-    int64_t samples, double *out
+    int64_t first, int64_t samples, double *out
 ) {
     double h = dt / (double)steps;
     m->ran = 0;
     if (m->friction.places) set_sides(m, start, drive);
-    for (int64_t sample = 0; sample < samples; sample++) {
+    for (int64_t sample = first; sample < samples; sample++) {
         const double *at = drive + 2 * steps * sample * m->drives;
         if (!m->ran) run_here(m, start + (double)sample * dt, at);
         if (!observe(m, observed, count, out + sample * count * m->columns)) return sample;
@@ -335,7 +321,7 @@ static void find_derivatives(Motion *m, const int64_t *slots, int64_t slot_width
     for (int64_t row = 0; row < m->rows; row++, slots += slot_width) {
         const double **direct = m->direct + row * m->width;
         direct[0] = r + slots[0];
-        for (int64_t c = 1; c < m->width; c++) direct[c] = &ZERO;
+        for (int64_t c = 1; c < m->width; c++) direct[c] = &NO_DERIVATIVE;
         for (int64_t i = 1; i < slot_width; i++) {
             int64_t at = slots[i], key = i - m->states;
             if (at >= inputs && at < first && r[at] == 0.0) continue;
@@ -411,6 +397,67 @@ int prepare_motion(
     return 1;
 }
 
+/* What `integrate` is told of all motions, and where each stands in it. */
+typedef struct {
+    Motion m;
+    int64_t method, steps, runs, observations, samples;
+    const int64_t *bounds, *observed;
+    const double *starts, *drive;
+    double dt, *states, *out;
+    double *last; /* of the last motion, where its last sample is another thread's; else 0 */
+} Motions;
+
+static int64_t length_of(const Motions *all, int64_t run) {
+    int64_t end = all->bounds[run + 1] + 1 < all->samples ? all->bounds[run + 1] + 1 : all->samples;
+    return end - all->bounds[run];
+}
+
+static double *target_of(const Motions *all, int64_t run) {
+    if (all->last && run + 1 == all->runs) return all->last;
+    return all->out + all->bounds[run] * all->observations * all->m.columns;
+}
+
+static const double *drive_of(const Motions *all, int64_t run) {
+    return all->drive + 2 * all->steps * all->bounds[run] * all->m.drives;
+}
+
+static double *states_of(const Motions *all, int64_t run) { return all->states + run * all->m.states * all->m.columns; }
+
+/* One motion from a sample of it on, at which it has its states; which of all samples is not finite. */
+static int64_t along(Motions *all, int64_t run, int64_t first) {
+    Motion *m = &all->m;
+    size_t of_row = (size_t)m->columns * sizeof(double);
+    double *y = states_of(all, run);
+    for (int64_t s = 0; s < m->states; s++) memcpy(m->state + s * m->width, y + s * m->columns, of_row);
+    int64_t failed =
+        all->method == ADAMS
+            ? along_adams(m, all->starts[run], all->dt, all->steps, drive_of(all, run), all->observed,
+                          all->observations, length_of(all, run), target_of(all, run))
+            : along_runge_kutta(m, all->starts[run], all->dt, all->steps, drive_of(all, run), all->observed,
+                                all->observations, first, length_of(all, run), target_of(all, run));
+    for (int64_t s = 0; s < m->states; s++) memcpy(y + s * m->columns, m->state + s * m->width, of_row);
+    return failed >= 0 ? failed + all->bounds[run] : failed;
+}
+
+/* A motion and the next at once as far as both go, then the longer alone; where one fails, one after the other. */
+static int64_t along_two(Motions *all, TwoMotions *two, int64_t run, double *begun) {
+    Motion *m = &all->m;
+    int64_t one = length_of(all, run), other = length_of(all, run + 1), common = one < other ? one : other;
+    int64_t failed, operations = 4 * (m->length + m->states * m->width) * all->steps * (common - 1);
+    double *states[2] = {states_of(all, run), states_of(all, run + 1)};
+    double *out[2] = {target_of(all, run), target_of(all, run + 1)};
+    const double *drive[2] = {drive_of(all, run), drive_of(all, run + 1)};
+    int both = along_both(two, states, all->starts + run, all->dt, all->steps, drive, all->observed, all->observations,
+                          common, out, begun);
+    m->done += both ? operations : 0;
+    failed = both && one == common ? ALL_FINITE : along(all, run, both ? common - 1 : 0);
+    if (failed != ALL_FINITE) return failed;
+    m->done += both ? operations : 0;
+    if (!both || other > common) failed = along(all, run + 1, both ? common - 1 : 0);
+    if (both) memcpy(out[1], begun, (size_t)(all->observations * m->columns) * sizeof(double));
+    return failed;
+}
+
 /*
  * Motions between neighbouring `bounds`, each from its own of the `states` and from its time in `starts`; the states
  * become those where it ends. A motion runs on to the first sample of the next, which overwrites it; the last one does
@@ -426,36 +473,35 @@ EXPORT int64_t integrate(
     int64_t dofs, int64_t state_count, int64_t columns, const int64_t *observed, int64_t observed_count,
     int64_t samples, double *out, int64_t *done
 ) {
-    Motion m = {.dofs = dofs, .states = state_count, .columns = columns, .drives = drives, .rows = rows,
-                .length = count, .onto = method != SUMMED};
-    m.friction = (Friction){.places = places, .sides = sides, .by_side = by_side, .directions = directions,
-                            .shifts = shifts};
-    int64_t failed = NO_MEMORY, runs = bound_count - 1, of_sample = observed_count * columns;
-    int64_t begin = bounds[runs - 1], end = bounds[runs] + 1 < samples ? bounds[runs] + 1 : samples;
-    size_t of_row = (size_t)columns * sizeof(double);
-    int shared = end > bounds[runs]; /* its last sample is another thread's: the motion is made beside `out` */
-    double *last = malloc((size_t)(shared ? (end - begin) * of_sample : 1) * sizeof(double));
+    Motions all = {.method = method, .steps = steps, .runs = bound_count - 1, .observations = observed_count,
+                   .samples = samples, .bounds = bounds, .observed = observed, .starts = starts, .drive = drive,
+                   .dt = dt, .states = states, .out = out};
+    Motion *m = &all.m;
+    *m = (Motion){.dofs = dofs, .states = state_count, .columns = columns, .drives = drives, .rows = rows,
+                  .length = count, .onto = method != SUMMED};
+    m->friction = (Friction){.places = places, .sides = sides, .by_side = by_side, .directions = directions,
+                             .shifts = shifts};
+    TwoMotions two = {0};
+    int64_t failed = NO_MEMORY, of_sample = observed_count * columns, end = bounds[all.runs];
+    int64_t of_last = length_of(&all, all.runs - 1) * of_sample;
+    int at_once = all.runs > 1 && method != ADAMS && places == 0 && state_count > 0 && columns <= WIDEST;
+    double *room = malloc((size_t)(of_last + of_sample + 1) * sizeof(double)), *begun = room + of_last;
+    if (end < samples) all.last = room; /* its last sample is another thread's: the motion is made beside `out` */
     Rounding before = rounding();
     set_rounding(before | TINY_IS_ZERO);
-    if (last && prepare_motion(&m, code, count, split, inputs, first, r, slots, slot_width)) {
+    if (room && prepare_motion(m, code, count, split, inputs, first, r, slots, slot_width) &&
+        (!at_once || prepare_two(&two, m, first + count))) {
         failed = ALL_FINITE;
-        for (int64_t i = 0; i < runs && failed == ALL_FINITE; i++) {
-            int64_t from = bounds[i], length = i + 1 < runs ? bounds[i + 1] + 1 - from : end - from;
-            double *y = states + i * state_count * columns;
-            double *target = i + 1 < runs || !shared ? out + from * of_sample : last;
-            for (int64_t s = 0; s < state_count; s++) memcpy(m.state + s * m.width, y + s * columns, of_row);
-            failed = (method == ADAMS ? along_adams : along_runge_kutta)(
-                &m, starts[i], dt, steps, drive + 2 * steps * from * drives, observed, observed_count, length, target
-            );
-            for (int64_t s = 0; s < state_count; s++) memcpy(y + s * columns, m.state + s * m.width, of_row);
-            if (failed >= 0) failed += from;
-        }
-        if (failed == ALL_FINITE && shared)
-            memcpy(out + begin * of_sample, last, (size_t)((bounds[runs] - begin) * of_sample) * sizeof(double));
+        for (int64_t i = 0; i < all.runs && failed == ALL_FINITE; i += 1 + at_once)
+            failed = at_once && i + 1 < all.runs ? along_two(&all, &two, i, begun) : along(&all, i, 0);
+        if (failed == ALL_FINITE && all.last)
+            memcpy(out + bounds[all.runs - 1] * of_sample, room,
+                   (size_t)((end - bounds[all.runs - 1]) * of_sample) * sizeof(double));
     }
-    *done += m.done;
+    *done += m->done;
     set_rounding(before);
-    free(last);
-    forget_motion(&m);
+    free(room);
+    forget_two(&two);
+    forget_motion(m);
     return failed;
 }

@@ -16,6 +16,11 @@
 
 #include "program.h"
 
+#define FAR 1e150     /* of a motion: its square is still a number, its cube is not */
+enum { WIDEST = 12 }; /* columns at once, which a processor keeps in its registers */
+
+extern const double NO_DERIVATIVE; /* zero, of a row by what it does not depend on */
+
 typedef struct {
     int64_t of;         /* state by which a row is differentiated */
     const double *from; /* register of the partial derivative */

@@ -5,25 +5,28 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Each operation of graph.Op in the order of its numbers, with its result. */
-#define EACH_OPERATION(DO)                                \
-    DO(0, a + b)                                          \
-    DO(1, a - b)                                          \
-    DO(2, a * b)                                          \
-    DO(3, a / b)                                          \
-    DO(4, -a)                                             \
-    DO(5, fabs(a))                                        \
-    DO(6, a > 0.0 ? 1.0 : (a < 0.0 ? -1.0 : 0.0))         \
-    DO(7, a > b ? a : b)                                  \
-    DO(8, a < b ? a : b)                                  \
-    DO(9, a > b ? 1.0 : 0.0)                              \
-    DO(10, sin(a))                                        \
-    DO(11, cos(a))                                        \
-    DO(12, exp(a))                                        \
-    DO(13, log(a))                                        \
-    DO(14, sqrt(a))                                       \
-    DO(15, tanh(a))                                       \
+/* Each operation of graph.Op in the order of its numbers, with its result: those that a processor does of pairs, */
+#define OF_PAIRS(DO) \
+    DO(0, a + b)     \
+    DO(1, a - b)     \
+    DO(2, a * b)     \
+    DO(3, a / b)     \
+    DO(4, -a)
+/* and those of single numbers. */
+#define OF_NUMBERS(DO)                             \
+    DO(5, fabs(a))                                 \
+    DO(6, a > 0.0 ? 1.0 : (a < 0.0 ? -1.0 : 0.0))  \
+    DO(7, a > b ? a : b)                           \
+    DO(8, a < b ? a : b)                           \
+    DO(9, a > b ? 1.0 : 0.0)                       \
+    DO(10, sin(a))                                 \
+    DO(11, cos(a))                                 \
+    DO(12, exp(a))                                 \
+    DO(13, log(a))                                 \
+    DO(14, sqrt(a))                                \
+    DO(15, tanh(a))                                \
     DO(16, pow(a, b))
+#define EACH_OPERATION(DO) OF_PAIRS(DO) OF_NUMBERS(DO)
 
 static double result_of(int64_t op, double a, double b) {
     switch (op) {
@@ -75,24 +78,68 @@ end:
 }
 
 static Operation operation_of(int64_t number) { return run_from(0)[number]; }
+
+#define PAIR_OPERATION(label, one, other, result) \
+    label : {                                     \
+        const Pair a = one, b = other;            \
+        (void)b;                                  \
+        last = result;                            \
+        *(Pair *)i->to = last;                    \
+        i++;                                      \
+        goto *i->op;                              \
+    }
+#define FORMS_OF_PAIRS(number, result)                                                     \
+    PAIR_OPERATION(from_memory_##number, *(const Pair *)i->a, *(const Pair *)i->b, result) \
+    PAIR_OPERATION(first_##number, last, *(const Pair *)i->b, result)                      \
+    PAIR_OPERATION(second_##number, *(const Pair *)i->a, last, result)                     \
+    PAIR_OPERATION(both_##number, last, last, result)
+#define EACH_BY_ITSELF(number, result)                                                          \
+    FORMS_OF_PAIRS(number, pair(result_of(number, a[0], b[0]), result_of(number, a[1], b[1])))
+
+/* The same of pairs. */
+#if !defined(__clang__)
+__attribute__((optimize("no-crossjumping", "no-code-hoisting")))
+#endif
+static const Operation *run_pairs_from(const Instruction *i) {
+    static const Operation OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
+    Pair last = pair(0.0, 0.0);
+    if (!i) return OPERATIONS;
+    goto *i->op;
+    OF_PAIRS(FORMS_OF_PAIRS)
+    OF_NUMBERS(EACH_BY_ITSELF)
+end:
+    return OPERATIONS;
+}
+
+static Operation pair_operation_of(int64_t number) { return run_pairs_from(0)[number]; }
 #else
 static void run_from(const Instruction *i) {
     for (; i->op != END; i++) *i->to = result_of(i->op / 4, *i->a, *i->b);
 }
 
+static void run_pairs_from(const Instruction *i) {
+    for (; i->op != END; i++)
+        for (int lane = 0; lane < 2; lane++) i->to[lane] = result_of(i->op / 4, i->a[lane], i->b[lane]);
+}
+
 static Operation operation_of(int64_t number) { return number; }
+
+static Operation pair_operation_of(int64_t number) { return number; }
 #endif
 
 void run_prepared(const Program *program) { run_from(program->code); }
 
 void run_rest(const Program *program) { run_from(program->rest); }
 
+void run_pairs(const Instruction *code) { run_pairs_from(code); }
+
 int prepare_program(
     Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
     const int64_t *others, int64_t other_count, const char *needed
 ) {
     char *changes = calloc((size_t)(first + count + 1), 1);
-    Instruction *next = program->code = malloc((size_t)(count + 2) * sizeof(Instruction));
+    Instruction *next = program->code = malloc((size_t)(count + 2) * (sizeof(Instruction) + 1));
+    unsigned char *number = program->numbers = (unsigned char *)(next + count + 2);
     program->r = r;
     if (!changes || !program->code) {
         free(changes);
@@ -105,6 +152,7 @@ int prepare_program(
     for (int64_t i = 0; i <= count; i++) {
         if (i == split || i == count) {
             *next++ = (Instruction){operation_of(END), r, r, r};
+            *number++ = END;
             last = 0;
             if (i == split) program->rest = next;
         }
@@ -115,12 +163,29 @@ int prepare_program(
             if (needed && !needed[to]) continue;
             op = 4 * op + (r + a == last) + 2 * (r + b == last);
             *next++ = (Instruction){operation_of(op), r + a, r + b, r + to};
+            *number++ = (unsigned char)op;
             last = r + to;
         } else
             r[to] = result_of(op, r[a], r[b]);
     }
     if (split == count) program->rest = next - 1;
+    program->count = next - program->code;
     free(changes);
+    return 1;
+}
+
+int prepare_pairs(Program *pairs, const Program *single, int64_t registers) {
+    size_t of_code = (size_t)single->count * sizeof(Instruction);
+    Instruction *code = pairs->code = malloc(of_code + 2 * (size_t)registers * sizeof(double));
+    double *r = pairs->r = (double *)((char *)code + of_code);
+    if (!code) return 0;
+    pairs->rest = code + (single->rest - single->code);
+    for (int64_t i = 0; i < registers; i++) r[2 * i] = r[2 * i + 1] = single->r[i];
+    for (int64_t i = 0; i < single->count; i++) {
+        const Instruction *one = single->code + i;
+        int64_t a = one->a - single->r, b = one->b - single->r, to = one->to - single->r;
+        code[i] = (Instruction){pair_operation_of(single->numbers[i]), r + 2 * a, r + 2 * b, r + 2 * to};
+    }
     return 1;
 }
 

@@ -29,7 +29,28 @@ typedef struct {
 typedef struct {
     Instruction *code, *rest; /* without the instructions whose results never change; each ends with END */
     double *r;
+    int64_t count;          /* of both, each END included, */
+    unsigned char *numbers; /* and the numbers of their operations */
 } Program;
+
+/* Two numbers at once: an operation on both takes a processor no longer than one on a single number. */
+#if defined(__GNUC__)
+typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
+static inline Pair pair(double first, double second) { return (Pair){first, second}; }
+static inline double first_of(Pair a) { return a[0]; }
+static inline double second_of(Pair a) { return a[1]; }
+static inline Pair plus_product(Pair a, Pair by, Pair b) { return a + by * b; }
+#else
+typedef struct {
+    double first, second;
+} Pair;
+static inline Pair pair(double first, double second) { return (Pair){first, second}; }
+static inline double first_of(Pair a) { return a.first; }
+static inline double second_of(Pair a) { return a.second; }
+static inline Pair plus_product(Pair a, Pair by, Pair b) {
+    return pair(a.first + by.first * b.first, a.second + by.second * b.second);
+}
+#endif
 
 /*
  * `count` instructions of three numbers each (operation, operands), the first of which writes register `first`, made
@@ -44,5 +65,12 @@ int prepare_program(
 void forget_program(Program *program);
 void run_prepared(const Program *program);
 void run_rest(const Program *program);
+
+/*
+ * A prepared program of twice the registers, a pair in place of each: both numbers of a register begin as that of the
+ * other program. It is run by `run_pairs`, its rest by itself. Returns 0 where there is no memory.
+ */
+int prepare_pairs(Program *pairs, const Program *single, int64_t registers);
+void run_pairs(const Instruction *code);
 
 #endif
