@@ -57,13 +57,17 @@ def test_integration(benchmark, path, method):
     benchmark(integration(read_model(path), method))
 
 
+@pytest.mark.parametrize("restarts", [(), range(20, 8180, 20)], ids=["whole", "in segments"])
 @pytest.mark.parametrize("keyed", [True, False], ids=["derivatives", "alone"])
 @pytest.mark.benchmark(group="free runs of a Duffing system, 8,192 samples in two steps each")
-def test_respond(benchmark, keyed):
+def test_respond(benchmark, keyed, restarts):
+    """In segments, as multiple shooting does: two at a time, and two threads."""
     model = read_model(MODELS[0].parent / "duffing.yaml")
-    run = prepare(model, Record(DT, {"force": the_force()}), tuple(model.values) if keyed else ())
+    record = Record(DT, {"force": the_force()})
+    run = prepare(model, record, tuple(model.values) if keyed else (), restarts=restarts)
     begin = count()  # elsewhere each time: a run that was made last is not made again
-    benchmark(lambda: run.respond(model.numbers(), (1e-9 * next(begin), 0.0), 2 * keyed))
+    initial = np.zeros((1 + len(restarts), 2))
+    benchmark(lambda: run.respond_by_segment(model.numbers(), initial + 1e-9 * next(begin), 2 * keyed))
 
 
 @pytest.mark.benchmark(group="free runs of a Duffing system, 8,192 samples in two steps each")

@@ -66,9 +66,7 @@ def climbed_ladder(row: Measurement, ladder: Ladder, title: str) -> pd.DataFrame
     The faults that the ladder names are corrected as the last model has them, for all models alike. Motions are as long
     as the first model that can be fitted follows them. A step whose model cannot be fitted has the reason as its note.
     """
-    options = list(row.options)
-    if ladder.fit:
-        options[options.index("--fit") + 1] = ladder.fit
+    options = [*row.options, *(("--fit", ladder.fit) if ladder.fit else ())]
     model, entries = read_model(Path(row.model)), [_entry(words) for words in ladder.terms]
     arguments = parser().parse_args(["compare", *row.paths, "--model", row.model, *options])
     records, rows = read_records(arguments, model), list[dict[str, Any]]()
