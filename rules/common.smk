@@ -27,7 +27,10 @@ def modules(script, **options):
 def step(script, input, output, params, wildcards):
     """Run a script as a rule's step: in a process of its own that has its packages already, or that is the job's."""
     told = {"input": input, "output": output, "params": params, "wildcards": wildcards}
-    (step_server.run_forked if workflow.is_main_process else step_server.run_here)(f"scripts/{script}.py", told)
+    if workflow.is_main_process:
+        step_server.run_forked(f"scripts/{script}.py", told, workflow.resource_settings.cores or 1)
+    else:
+        step_server.run_here(f"scripts/{script}.py", told)
 
 
 CODE = {

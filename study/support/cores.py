@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import TypeVar
 
 from study.support import work
@@ -10,6 +11,7 @@ from study.support import work
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Other = TypeVar("Other")
+_AT_WORK: list[object] = []  # something for each core that has something to do
 
 
 def cores() -> int:
@@ -24,12 +26,29 @@ def one_thread_of_algebra() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+def beside_others(jobs: int) -> None:
+    """Say that this process is one of so many at work, a core each."""
+    _AT_WORK.extend(range(jobs))
+
+
 def two_at_once(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
-    """Results of two functions, the first in a thread of its own; what it does is counted here."""
-    with ThreadPoolExecutor(1) as beside:
-        begun = beside.submit(work.counted_here(one))
+    """Results of two functions, the first in a thread of its own if a core is idle; what it does is counted here.
+
+    Both are called in any case, so that as much is counted whatever else has to be done; of two errors the other's is
+    raised.
+    """
+    if max(1, len(_AT_WORK)) < cores():
+        with ThreadPoolExecutor(1) as beside:
+            begun = beside.submit(work.counted_here(one))
+            second = other()
+            return begun.result(), second
+    try:
         second = other()
-        return begun.result(), second
+    except Exception:
+        with suppress(Exception):
+            one()
+        raise
+    return one(), second
 
 
 def side_by_side(
@@ -43,8 +62,16 @@ def side_by_side(
     What takes the most ``effort`` is begun first: last, it would keep the other cores waiting.
     """
     hardest_first = sorted(range(len(items)), key=lambda i: -effort(items[i]) if effort else 0.0)
+
+    def at_work(item: Item) -> Result:
+        _AT_WORK.append(item)
+        try:
+            return function(item)
+        finally:
+            _AT_WORK.pop()
+
     with ThreadPoolExecutor(workers or cores()) as pool:
-        counted = work.counted_here(function)
+        counted = work.counted_here(at_work)
         begun = {i: pool.submit(counted, items[i]) for i in hardest_first}
         try:
             for i in range(len(items)):

@@ -14,6 +14,7 @@ from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 
+from study.support.cores import beside_others
 from study.support.errors import StudyError
 
 FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
@@ -29,15 +30,17 @@ def preload(scripts: Iterable[str], *modules: str) -> None:
     forkserver.ensure_running()
 
 
-def run_forked(script: str, step: Mapping[str, Any]) -> None:
+def run_forked(script: str, step: Mapping[str, Any], jobs: int) -> None:
     """Run a script that finds ``step``, plain data, as its ``snakemake``; it may be called from several threads.
+
+    So many ``jobs`` may be at work at a time, this one included.
 
     Raises
     ------
     StudyError
         If the script ends with another exit code than 0; it has then said why.
     """
-    process = FORKS.Process(target=run_here, args=(script, step))
+    process = FORKS.Process(target=run_here, args=(script, step, jobs))
     with ASKING:  # to start one also asks how others ended, and that is told once
         process.start()
     wait([process.sentinel])
@@ -47,6 +50,7 @@ def run_forked(script: str, step: Mapping[str, Any]) -> None:
         raise StudyError(f"{script} ended with exit code {process.exitcode}")
 
 
-def run_here(script: str, step: Mapping[str, Any]) -> None:
+def run_here(script: str, step: Mapping[str, Any], jobs: int = 1) -> None:
     """Run a script in this process; a ``SystemExit`` passes."""
+    beside_others(jobs)
     runpy.run_path(script, {"snakemake": SimpleNamespace(**step)})

@@ -29,7 +29,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def asked(folder, name, do="write"):
-    run_forked("step.py", {"output": str(folder / name), "params": {"do": do}})
+    run_forked("step.py", {"output": str(folder / name), "params": {"do": do}}, 2)
     return (folder / name).read_text().split()
 
 
