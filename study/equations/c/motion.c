@@ -484,7 +484,7 @@ EXPORT int64_t integrate(
     TwoMotions two = {0};
     int64_t failed = NO_MEMORY, of_sample = observed_count * columns, end = bounds[all.runs];
     int64_t of_last = length_of(&all, all.runs - 1) * of_sample;
-    int at_once = all.runs > 1 && method != ADAMS && places == 0 && state_count > 0 && columns <= WIDEST;
+    int at_once = all.runs > 1 && method != ADAMS && places == 0 && state_count > 0;
     double *room = malloc((size_t)(of_last + of_sample + 1) * sizeof(double)), *begun = room + of_last;
     if (end < samples) all.last = room; /* its last sample is another thread's: the motion is made beside `out` */
     Rounding before = rounding();

@@ -45,16 +45,55 @@ void forget_two(TwoMotions *two) {
     free(two->by_state);
 }
 
-/* Columns of a row where the program has run at the states `at`. */
+/* So many columns of a row, from `first` on, where the program has run at the states `at`. */
 WRITTEN_OUT void row_of_both(
-    const Pair *const *direct, const PairPartial *state, const PairPartial *last, const Pair *at, Pair *restrict to,
-    int64_t columns
+    const TwoMotions *two, int64_t row, const Pair *at, Pair *restrict to, int64_t columns, int64_t first, int64_t count
 ) {
-    for (int64_t c = 0; c < columns; c++) to[c] = *direct[c];
+    const Pair *const *direct = two->direct + row * columns + first;
+    const PairPartial *state = two->by_state + two->one->ends[row], *last = two->by_state + two->one->ends[row + 1];
+    for (int64_t c = 0; c < count; c++) to[c] = *direct[c];
     for (; state < last && columns > 1; state++) {
         Pair by = *state->from;
-        const Pair *row_of_state = at + state->of * columns;
-        for (int64_t c = 1; c < columns; c++) to[c] = plus_product(to[c], by, row_of_state[c]);
+        const Pair *row_of_state = at + state->of * columns + first;
+        for (int64_t c = first == 0; c < count; c++) to[c] = plus_product(to[c], by, row_of_state[c]);
+    }
+}
+
+/* Columns of a state in one stage of a step, as `advance` of one motion. */
+WRITTEN_OUT void advance_both(
+    const TwoMotions *two, int64_t i, const Pair *at, Pair *next, double weight, double ahead, int64_t columns,
+    int64_t first, int64_t count
+) {
+    const int64_t dofs = two->one->dofs, begin = i * columns + first;
+    Pair by = pair(weight, weight), on = pair(ahead, ahead), *registers = two->r + 1 + two->one->drives;
+    Pair slope[WIDEST] = {{0.0, 0.0}}, *restrict sum = two->sum + begin, *restrict to = next + begin;
+    const Pair *restrict state = two->state + begin, *velocity = at + dofs * columns + begin;
+    if (i < dofs)
+        for (int64_t c = 0; c < count; c++) slope[c] = velocity[c];
+    else
+        row_of_both(two, i - dofs, at, slope, columns, first, count);
+    if (first == 0) registers[i] = plus_product(state[0], on, slope[0]);
+    for (int64_t c = 0; c < count; c++) {
+        sum[c] = plus_product(sum[c], by, slope[c]);
+        to[c] = plus_product(state[c], on, slope[c]);
+    }
+}
+
+#define EACH_COUNT(DO) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12)
+
+/* A row wider than WIDEST in parts. */
+static void advance_in_parts(
+    const TwoMotions *two, int64_t i, const Pair *at, Pair *next, double weight, double ahead, int64_t columns
+) {
+    int64_t first = 0;
+    for (; columns - first > WIDEST; first += WIDEST)
+        advance_both(two, i, at, next, weight, ahead, columns, first, WIDEST);
+    switch (columns - first) {
+#define REST(count)                                                           \
+    case count:                                                               \
+        advance_both(two, i, at, next, weight, ahead, columns, first, count); \
+        break;
+        EACH_COUNT(REST)
     }
 }
 
@@ -62,24 +101,14 @@ WRITTEN_OUT void row_of_both(
 WRITTEN_OUT void stage_of_both(
     const TwoMotions *two, int64_t ran, const Pair *at, Pair *next, double weight, double ahead, int64_t columns
 ) {
-    const TwoMotions t = *two;
-    const int64_t dofs = t.one->dofs, states = t.one->states, *ends = t.one->ends;
-    Pair by = pair(weight, weight), on = pair(ahead, ahead), *registers = t.r + 1 + t.one->drives;
+    const TwoMotions t = *two; /* whose pointers no pair that is written can change */
+    const int64_t states = t.one->states;
     if (!ran) run_pairs(t.program.code);
-    for (int64_t i = 0; i < states; i++) {
-        Pair slope[WIDEST], *restrict sum = t.sum + i * columns, *restrict to = next + i * columns;
-        const Pair *restrict state = t.state + i * columns, *velocity = at + (dofs + i) * columns;
-        const Pair *const *direct = t.direct + (i - dofs) * columns;
-        if (i < dofs)
-            for (int64_t c = 0; c < columns; c++) slope[c] = velocity[c];
+    for (int64_t i = 0; i < states; i++)
+        if (columns <= WIDEST)
+            advance_both(&t, i, at, next, weight, ahead, columns, 0, columns);
         else
-            row_of_both(direct, t.by_state + ends[i - dofs], t.by_state + ends[i - dofs + 1], at, slope, columns);
-        registers[i] = plus_product(state[0], on, slope[0]);
-        for (int64_t c = 0; c < columns; c++) {
-            sum[c] = plus_product(sum[c], by, slope[c]);
-            to[c] = plus_product(state[c], on, slope[c]);
-        }
-    }
+            advance_in_parts(two, i, at, next, weight, ahead, columns);
 }
 
 static inline void drive_both(const TwoMotions *two, const double times[2], double later, const double *const drive[2]) {
@@ -126,7 +155,9 @@ static void step_both(
     case columns:                                         \
         step_of_both(two, ran, times, h, drive, columns); \
         return;
-        STEP(1) STEP(2) STEP(3) STEP(4) STEP(5) STEP(6) STEP(7) STEP(8) STEP(9) STEP(10) STEP(11) STEP(12)
+        EACH_COUNT(STEP)
+    default:
+        step_of_both(two, ran, times, h, drive, two->one->columns);
     }
 }
 
@@ -145,14 +176,11 @@ static int observe_both(TwoMotions *two, const int64_t *observed, int64_t count,
     for (int64_t k = 0; k < count; k++) own += observed[k] >= m->states;
     if (own) run_pairs(two->program.rest);
     for (int64_t k = 0; k < count; k++) {
-        Pair row[WIDEST];
         const Pair *found = two->state + observed[k] * columns;
         if (observed[k] >= m->states) {
-            int64_t i = observed[k] - m->states;
-            const Pair *const *direct = two->direct + i * columns;
-            row_of_both(direct, two->by_state + m->ends[i], two->by_state + m->ends[i + 1], two->state, row, columns);
-            if (!are_finite(row[0])) return 0;
-            found = row;
+            row_of_both(two, observed[k] - m->states, two->state, two->sum, columns, 0, columns);
+            if (!are_finite(two->sum[0])) return 0;
+            found = two->sum;
         }
         for (int64_t c = 0; c < columns; c++) {
             out[0][k * columns + c] = first_of(found[c]);

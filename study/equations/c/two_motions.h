@@ -22,7 +22,7 @@ typedef struct {
     Pair *state, *trial, *other, *sum;   /* states x columns each */
 } TwoMotions;
 
-/* Room, and a program, for two of a motion made ready, of WIDEST columns at most; 0 where there is no memory. */
+/* Room, and a program, for two of a motion made ready; 0 where there is no memory. */
 int prepare_two(TwoMotions *two, const Motion *one, int64_t registers);
 void forget_two(TwoMotions *two);
 
