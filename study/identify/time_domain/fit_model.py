@@ -43,6 +43,7 @@ from study.identify.time_domain.settling import (
 )
 from study.identify.time_domain.shape_search import Baseline, Start
 from study.identify.time_domain.shooting import own_begins
+from study.identify.time_domain.stretch_states import resembles_a_motion
 from study.identify.time_domain.told_alone import (
     entry_alone,
     fit_alone,
@@ -158,12 +159,14 @@ def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
     """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term.
 
-    A chaotic system loses the motion in any single run, built up or not: it is fitted in segments at once.
+    A chaotic system loses the motion in any single run, built up or not: it is fitted in segments at once. What follows
+    the motion and ran out of runs is no such case.
     """
     fit, reason, starts = None, None, first_starts(model, prepared)
     nonlinear = any(term.name not in LINEAR for term in model.terms)
     first = _each_tried(model, prepared, starts, model.held_keys)
-    if nonlinear and first and not any(f.converged for f in first):
+    lost = first and not any(f.converged for f in first) and resembles_a_motion(first[0], prepared.fitted)
+    if nonlinear and lost:
         apart = of_chaos(first[0], prepared, starts[-1])
         if apart is not None:
             return apart
