@@ -11,7 +11,7 @@ from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.frequency_domain.starting_values import coherent_lines
 from study.identify.time_domain import fit_model as fits
-from study.identify.time_domain import settling, shape_search
+from study.identify.time_domain import multiple_shooting, settling, shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.no_response import LINEAR, driven_at
@@ -101,6 +101,45 @@ def test_a_chaotic_system_is_fitted_in_segments_at_once(systems, monkeypatch):
     fit = fit_model(unknown, whole(noisy(made, fraction=1e-4)))
     assert fit.converged
     assert fit.restarts
+    for key in fit.keys:
+        assert abs(fit.estimate[key] - truth.values[key]) < 4.0 * fit.estimate.error(key), key
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_chaotic_system_begun_near_its_values_is_one_motion_at_once(systems, monkeypatch, fails):
+    """Longer and longer segments, half of the time of a search, are for where that fails; it ends at the same values."""
+    truth, longer, motions = systems["dead_band"], [], []
+    made = simulate(truth, force(Excitation(), 8192, 0.02, 9101), 0.02, Integrator("abm4", 16))
+    prepared = whole(noisy(made, fraction=1e-4))
+    by_shooting = {name: getattr(multiple_shooting, name) for name in ("lengthen", "_one_motion")}
+
+    def lengthened(*told):
+        longer.append(told)
+        return by_shooting["lengthen"](*told)
+
+    def one_motion(*told):
+        motions.append(told)
+        return None if fails and len(motions) == 1 else by_shooting["_one_motion"](*told)
+
+    monkeypatch.setattr(multiple_shooting, "lengthen", lengthened)
+    monkeypatch.setattr(multiple_shooting, "_one_motion", one_motion)
+    fit = fit_model(truth.opened(held=["dead_band.u_g"]), prepared)
+    assert len(longer) == fails
+    assert fit.converged
+    assert fit.restarts
+    for key in fit.keys:
+        assert abs(fit.estimate[key] - truth.values[key]) < 4.0 * fit.estimate.error(key), key
+
+
+def test_starts_that_follow_the_motion_and_want_more_steps_are_no_search(systems, monkeypatch):
+    """Two steps a sample leave more of the dead band's corners than noise: the fit comes to no minimum with them."""
+    truth = systems["dead_band"]
+    blows = Excitation(kind="blows", cutoff=12.5, blows=12, level=0.5)
+    made = simulate(truth, force(blows, 8192, 0.02, 9101), 0.02, Integrator("abm4", 16))
+    monkeypatch.setattr(fits, "_from_nothing", lambda *_: pytest.fail("a search from nothing"))
+    fit = fit_model(truth.opened(held=["dead_band.u_g"]), whole(noisy(made, fraction=1e-4)))
+    assert fit.converged
+    assert fit.steps_per_sample > 2
     for key in fit.keys:
         assert abs(fit.estimate[key] - truth.values[key]) < 4.0 * fit.estimate.error(key), key
 

@@ -101,9 +101,9 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
             fit_part(model, prepared, model.held_keys, start, steps=rough_steps(model, prepared, start)), prepared
         )
     if model.starts and set(model.starts) == {key for key, value in model.values.items() if value is None}:
-        begun = _tried(model, prepared, model.held_keys, model.starts, KEPT)
-        if begun is not None and begun.converged:
-            return _followed(settled(begun, prepared), model, prepared)
+        begun = _from_its_starts(model, prepared)
+        if begun is not None:
+            return _followed(begun, model, prepared)
     changes = tuple(t for t in model.terms if t.term.variation and None in t.coefficients)
     unknown = (*(t for t in model.terms if None in t.parameters and t not in changes), *changes)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
@@ -118,6 +118,19 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     in_order = tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms)
     ordered = replace(fit.model, terms=in_order)
     return _followed(settled(continued(replace(fit, model=ordered), prepared), prepared), model, prepared)
+
+
+def _from_its_starts(model: Model, prepared: Prepared) -> FreeRunFit | None:
+    """The fit of a model that says where all begins that it leaves open; None where that leads to no minimum."""
+    begun = _tried(model, prepared, model.held_keys, model.starts, KEPT)
+    if begun is None:
+        return None
+    lost = resembles_a_motion(begun, prepared.fitted)
+    apart = of_chaos(begun, prepared, model.starts, near=True) if lost else None
+    if apart is not None or (lost and not begun.converged):
+        return apart
+    fit = settled(begun, prepared)  # what follows the motion and ran out of runs may want more steps alone
+    return fit if begun.converged or fit.converged else None
 
 
 def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:

@@ -1,6 +1,7 @@
 """Multiple shooting: fitting a chaotic system in free run, or any system from starting values that are far off."""
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +39,7 @@ def fit_in_segments(
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
     max_iterations: int = 60,
+    near: bool = False,
 ) -> FreeRunFit:
     """Fit a model in free run when it is chaotic, or the start is far off (H. G. Bock, 1983).
 
@@ -45,7 +47,8 @@ def fit_in_segments(
     them, so the search converges from poor starting values. If the fitted system needs no restarts, as most do, the
     whole record is then fitted in one free run. Otherwise continuation in segment length finds the states, and
     increasing continuity constraints turn all segments into one motion. Where that fails, it is tried again with the
-    coefficients of the longest segments that held.
+    coefficients of the longest segments that held. ``near`` says that the start is near the minimum: the constraints
+    come at once then, and longer segments where they lead to none.
 
     Parameters, result and errors are those of :func:`free_run_fit.fit_free_run`; ``initial`` of the result has a row
     for each segment.
@@ -68,10 +71,15 @@ def fit_in_segments(
         )  # fmt: skip
     if loose.rms < NEGLIGIBLE * segments.spread:  # continuity constraints would fit the errors of the integrator
         return fit_segments(loose.model, segments, states, held, max_iterations)
-    near = fit_segments(begun, rough, states, held, SOFTLY, SOFT[0], NEAR)
+    soft = fit_segments(begun, rough, states, held, SOFTLY, SOFT[0], NEAR)
     for continuity in SOFT[1:]:
-        near = fit_segments(near.model, rough, near.initial, held, SOFTLY, continuity, NEAR)
-    return _continuous(near, loose, segments, rough, held)
+        soft = fit_segments(soft.model, rough, soft.initial, held, SOFTLY, continuity, NEAR)
+    if near:
+        with suppress(DivergenceError):
+            fit = _one_motion(soft, segments, held, loose)
+            if fit is not None and fit.converged:
+                return fit
+    return _continuous(soft, loose, segments, rough, held)
 
 
 def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:

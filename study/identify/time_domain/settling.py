@@ -61,19 +61,22 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return apart if apart is not None and apart.converged and apart.rms <= best.rms else best
 
 
-def of_chaos(fit: FreeRunFit, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit | None:
+def of_chaos(
+    fit: FreeRunFit, prepared: Prepared, start: Mapping[str, float], near: bool = False
+) -> FreeRunFit | None:  # fmt: skip
     """The fit in segments of a chaotic system, from a start, where one run with the values of that leaves a motion.
 
     The many minima of single runs are worth no search then. None for a system that is not chaotic where ``fit``, an
-    attempt at one run, stands, and where the search in segments does not converge.
+    attempt at one run, stands, and where the search in segments does not converge. ``near`` is that of
+    :func:`multiple_shooting.fit_in_segments`.
     """
-    if prepared.response == FORCE or not is_chaotic(fit, prepared):
+    if prepared.response == FORCE or not seen_everywhere(fit.model, prepared) or not is_chaotic(fit, prepared):
         return None
     steps = max(MOST_FIT_STEPS, fit.steps_per_sample)  # chaos magnifies the integration's error as any other
     try:
         apart = fit_in_segments(
             fit.model, prepared.record, start=start, held=fit.held, outputs=prepared.outputs, span=prepared.plan.fit,
-            steps_per_sample=steps,
+            steps_per_sample=steps, near=near,
         )  # fmt: skip
         first = np.atleast_2d(apart.initial)[:1]
         once = fit_part(apart.model, prepared, fit.held, steps=steps, initial=first, max_iterations=0)

@@ -58,7 +58,6 @@ WITHOUT_FORCE = (
     "lines without a force hold what segments leak from those with one, and their small residual gives them the "
     "largest weight: a mass of zero explains them best"
 )
-NOT_FOLLOWED = "dead_band"  # chaotic: no single run follows its motion, from wherever it begins
 Driven = tuple[str, ExcitationSettings, float]  # a force: its name, its settings, its mean square
 
 
@@ -160,7 +159,7 @@ def _identified(
         settings = replace(settings, band=_driven_band(matrix, settings, least))
     if estimator in ("miso", DRIVEN_LINES):
         return identify_spectra(reverse_inputs(model), result, settings)
-    if estimator == "output_error" and model.name != NOT_FOLLOWED:  # begun at the truth, as a search ends there too
+    if estimator == "output_error":  # begun at the truth, as a search ends there too
         model = replace(model, terms=tuple(entry.opened() for entry in model.terms))
     return estimators.identify(estimator, model, record, settings)
 
