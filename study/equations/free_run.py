@@ -188,8 +188,7 @@ class FreeRun:
         firsts, anew = np.array((0, *self.cuts)), sorted(initial)
         motion = replace(self.motion, observed=np.arange(self.states))  # a row of a program is a state before all else
         state = np.stack([np.asarray(initial[i], dtype=np.float64) for i in anew])[:, :, np.newaxis]
-        out = np.empty((self.length, self.states, 1))
-        self._integrate(motion, (*firsts[anew].tolist(), self.samples), state, out)
+        out, _ = self._run(motion, (*firsts[anew].tolist(), self.samples), state)
         return out[self.along(firsts.tolist()), :, 0]
 
     def _integrate(self, motion: MotionProgram, cuts: Sequence[int], states: Floats, out: Floats) -> int:

@@ -107,7 +107,7 @@ def test_a_chaotic_system_is_fitted_in_segments_at_once(systems, monkeypatch):
 
 @pytest.mark.parametrize("fails", [False, True])
 def test_a_chaotic_system_begun_near_its_values_is_one_motion_at_once(systems, monkeypatch, fails):
-    """Longer and longer segments, half of the time of a search, are for where that fails; it ends at the same values."""
+    """Longer and longer segments, half of the time of a search, are for where that fails."""
     truth, longer, motions = systems["dead_band"], [], []
     made = simulate(truth, force(Excitation(), 8192, 0.02, 9101), 0.02, Integrator("abm4", 16))
     prepared = whole(noisy(made, fraction=1e-4))
