@@ -10,7 +10,7 @@ of it is the force that this takes. With a modal linear part the columns of T ar
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from study.equations.graph import Graph, Program
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm
 from study.equations.place import GROUND, Place
-from study.equations.term import Component
+from study.equations.term import Component, Term
 from study.records.record import MOTIONS, Sensor
 
 
@@ -195,7 +195,7 @@ def loose_motions(model: Model) -> int:
 
     What a term remembers of the motion ties nothing: it gives way.
     """
-    ties = [np.array(entry.place.direction(model.coordinates)) for entry in model.terms if _ties(entry)]
+    ties = [np.array(entry.place.direction(model.coordinates)) for entry in model.terms if _ties(entry.term)]
     return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
 
 
@@ -204,9 +204,10 @@ def has_spring(model: Model) -> bool:
     return loose_motions(model) < len(model.coordinates)
 
 
-def _ties(entry: ModelTerm) -> bool:
+@lru_cache(maxsize=256)
+def _ties(term: Term) -> bool:
     """Whether the force of a term at rest depends on the displacement, and not so that it repeats itself further on."""
-    graph, term = Graph(), entry.term
+    graph = Graph()
     if term.repeats:
         return False
     names = {n: graph.input(n) for n in ("u", "t", "z", *term.channels, *(p.name for p in term.parameters))}
