@@ -121,16 +121,21 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
 
 
 def _from_its_starts(model: Model, prepared: Prepared) -> FreeRunFit | None:
-    """The fit of a model that says where all begins that it leaves open; None where that leads to no minimum."""
+    """The fit of a model that says where all begins that it leaves open; None where that leads to no minimum.
+
+    What follows the motion and ran out of runs may want no more than finer steps.
+    """
     begun = _tried(model, prepared, model.held_keys, model.starts, KEPT)
     if begun is None:
         return None
     lost = resembles_a_motion(begun, prepared.fitted)
-    apart = of_chaos(begun, prepared, model.starts, near=True) if lost else None
-    if apart is not None or (lost and not begun.converged):
-        return apart
-    fit = settled(begun, prepared)  # what follows the motion and ran out of runs may want more steps alone
-    return fit if begun.converged or fit.converged else None
+    fit = of_chaos(begun, prepared, model.starts, near=True) if lost else begun
+    if fit is None and begun.converged:
+        fit = begun
+    if fit is None or fit.restarts:
+        return fit
+    again = settled(fit, prepared)
+    return again if fit.converged or again.converged else None
 
 
 def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:

@@ -64,7 +64,7 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def of_chaos(
     fit: FreeRunFit, prepared: Prepared, start: Mapping[str, float], near: bool = False
 ) -> FreeRunFit | None:  # fmt: skip
-    """The fit in segments of a chaotic system, from a start, where one run with the values of that leaves a motion.
+    """The fit of a chaotic system from a start: in segments, or in one run from their values where that stands.
 
     The many minima of single runs are worth no search then. None for a system that is not chaotic where ``fit``, an
     attempt at one run, stands, and where the search in segments does not converge. ``near`` is that of
@@ -80,9 +80,14 @@ def of_chaos(
         )  # fmt: skip
         first = np.atleast_2d(apart.initial)[:1]
         once = fit_part(apart.model, prepared, fit.held, steps=steps, initial=first, max_iterations=0)
+        if not (apart.restarts and apart.converged):
+            return None
+        if resembles_a_motion(once, prepared.fitted):
+            return apart
+        together = fit_part(apart.model, prepared, fit.held, steps=steps, initial=first)
     except DivergenceError:
         return None
-    return apart if apart.restarts and apart.converged and resembles_a_motion(once, prepared.fitted) else None
+    return together if together.converged and not _more_than_states(apart, together) else apart
 
 
 def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
