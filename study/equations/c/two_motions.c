@@ -7,9 +7,9 @@
 #include <string.h>
 
 #if defined(__GNUC__)
-#define WRITTEN_OUT static inline __attribute__((always_inline)) /* for each number of columns */
+#define ALWAYS_INLINE static inline __attribute__((always_inline)) /* code of its own for each number of columns */
 #else
-#define WRITTEN_OUT static inline
+#define ALWAYS_INLINE static inline
 #endif
 
 static const Pair NONE[1]; /* zeros */
@@ -46,7 +46,7 @@ void forget_two(TwoMotions *two) {
 }
 
 /* So many columns of a row, from `first` on, where the program has run at the states `at`. */
-WRITTEN_OUT void row_of_both(
+ALWAYS_INLINE void row_of_both(
     const TwoMotions *two, int64_t row, const Pair *at, Pair *restrict to, int64_t columns, int64_t first, int64_t count
 ) {
     const Pair *const *direct = two->direct + row * columns + first;
@@ -60,7 +60,7 @@ WRITTEN_OUT void row_of_both(
 }
 
 /* Columns of a state in one stage of a step, as `advance` of one motion. */
-WRITTEN_OUT void advance_both(
+ALWAYS_INLINE void advance_both(
     const TwoMotions *two, int64_t i, const Pair *at, Pair *next, double weight, double ahead, int64_t columns,
     int64_t first, int64_t count
 ) {
@@ -98,7 +98,7 @@ static void advance_in_parts(
 }
 
 /* One stage of a step, as `stage_of` of one motion. */
-WRITTEN_OUT void stage_of_both(
+ALWAYS_INLINE void stage_of_both(
     const TwoMotions *two, int64_t ran, const Pair *at, Pair *next, double weight, double ahead, int64_t columns
 ) {
     const TwoMotions t = *two; /* whose pointers no pair that is written can change */
@@ -124,7 +124,7 @@ static inline void states_into_registers(const TwoMotions *two) {
         two->r[1 + two->one->drives + i] = two->state[i * two->one->columns];
 }
 
-WRITTEN_OUT void step_of_both(
+ALWAYS_INLINE void step_of_both(
     const TwoMotions *two, int64_t ran, const double times[2], double h, const double *const drive[2], int64_t columns
 ) {
     const TwoMotions t = *two;
