@@ -11,24 +11,25 @@ from study.support import work
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Other = TypeVar("Other")
-_AT_WORK: list[object] = []  # something for each core that has something to do
+_SHARED = {"processes": 1}
+_AT_WORK: list[object] = []  # an item for each thread that has one
 
 
 def cores() -> int:
     """Cores that this process may use, which a batch system or a container may hold below those of the machine."""
-    if hasattr(os, "sched_getaffinity"):  # Linux alone tells
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    tells = hasattr(os, "sched_getaffinity")  # Linux alone
+    there = len(os.sched_getaffinity(0)) if tells else os.cpu_count() or 1
+    return max(1, there // _SHARED["processes"])
+
+
+def share_cores(processes: int) -> None:
+    """Say that so many processes share these cores, this one included."""
+    _SHARED["processes"] = processes
 
 
 def one_thread_of_algebra() -> None:
     """Keep NumPy, which is not to be loaded yet, from threads of its own: beside others they wait and take a core."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-def beside_others(jobs: int) -> None:
-    """Say that this process is one of so many at work, a core each."""
-    _AT_WORK.extend(range(jobs))
 
 
 def two_at_once(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:

@@ -14,7 +14,7 @@ from threading import Lock
 from types import SimpleNamespace
 from typing import Any
 
-from study.support.cores import beside_others
+from study.support.cores import share_cores
 from study.support.errors import StudyError
 
 FORKS, ASKING = multiprocessing.get_context("forkserver"), Lock()
@@ -52,5 +52,5 @@ def run_forked(script: str, step: Mapping[str, Any], jobs: int) -> None:
 
 def run_here(script: str, step: Mapping[str, Any], jobs: int = 1) -> None:
     """Run a script in this process; a ``SystemExit`` passes."""
-    beside_others(jobs)
+    share_cores(jobs)
     runpy.run_path(script, {"snakemake": SimpleNamespace(**step)})

@@ -1,13 +1,13 @@
 """Work side by side: in order, each begun, no error lost."""
 
 import time
-from threading import current_thread
+from threading import Barrier, current_thread
 
 import pytest
 
 from study.support import cores as all_cores
 from study.support import work
-from study.support.cores import beside_others, side_by_side, two_at_once
+from study.support.cores import share_cores, side_by_side, two_at_once
 
 
 @pytest.mark.parametrize("workers", [None, 1, 4])
@@ -30,20 +30,33 @@ def test_an_error_in_one_item_is_not_lost() -> None:
         list(side_by_side(lambda item: 1 / item, [1, 0, 2]))
 
 
+def machine_of(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(all_cores.os, "sched_getaffinity", lambda _: set(range(cores)), raising=False)
+    monkeypatch.setattr(all_cores, "_SHARED", {"processes": 1})
+
+
 def two_threads() -> int:
     return len(set(two_at_once(current_thread, current_thread)))
 
 
-@pytest.mark.parametrize(("cores", "jobs", "threads"), [(1, 0, 1), (2, 0, 2), (2, 2, 1), (4, 2, 2)])
+@pytest.mark.parametrize(("cores", "processes", "own"), [(1, 1, 1), (2, 1, 2), (2, 2, 1), (4, 2, 2), (2, 8, 1)])
 def test_a_second_thread_is_for_a_core_that_is_idle(
-    cores: int, jobs: int, threads: int, monkeypatch: pytest.MonkeyPatch
+    cores: int, processes: int, own: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(all_cores, "cores", lambda: cores)
-    monkeypatch.setattr(all_cores, "_AT_WORK", list[object]())
-    beside_others(jobs)
-    assert two_threads() == threads
-    assert list(side_by_side(lambda _: two_threads(), range(3), workers=1)) == [2 if cores - jobs > 1 else 1] * 3
-    assert two_threads() == threads  # they have ended
+    machine_of(cores, monkeypatch)
+    share_cores(processes)
+    assert all_cores.cores() == own
+    assert two_threads() == (2 if own > 1 else 1)
+    together = Barrier(own)
+
+    def beside_others(_: int) -> int:
+        together.wait(timeout=10.0)  # until all have begun
+        threads = two_threads()
+        together.wait(timeout=10.0)
+        return threads
+
+    assert list(side_by_side(beside_others, range(own))) == [1] * own
+    assert two_threads() == (2 if own > 1 else 1)  # they have ended
 
 
 @pytest.mark.parametrize("cores", [1, 2])
@@ -56,7 +69,7 @@ def test_where_one_of_two_fails_as_much_is_counted_on_any_number_of_cores(
         if name in failing:
             raise ValueError(name)
 
-    monkeypatch.setattr(all_cores, "cores", lambda: cores)
+    machine_of(cores, monkeypatch)
     with work.limited_to(10.0):
         with pytest.raises(ValueError, match="other" if "other" in failing else "one"):
             two_at_once(lambda: done("one"), lambda: done("other"))
