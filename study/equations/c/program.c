@@ -45,6 +45,25 @@ static double result_of(int64_t op, double a, double b) {
  * operand is such a one, and 2 if the second is.
  */
 #if defined(__GNUC__)
+#define OPERATION(Kind, label, one, other, result) \
+    label : {                                      \
+        const Kind a = one, b = other;             \
+        (void)b;                                   \
+        last = result;                             \
+        *(Kind *)i->to = last;                     \
+        i++;                                       \
+        goto *i->op;                               \
+    }
+#define OPERATIONS_OF(Kind, number, result)                                                 \
+    OPERATION(Kind, from_memory_##number, *(const Kind *)i->a, *(const Kind *)i->b, result) \
+    OPERATION(Kind, first_##number, last, *(const Kind *)i->b, result)                      \
+    OPERATION(Kind, second_##number, *(const Kind *)i->a, last, result)                     \
+    OPERATION(Kind, both_##number, last, last, result)
+#define OF_NUMBER(number, result) OPERATIONS_OF(double, number, result)
+#define OF_PAIR(number, result) OPERATIONS_OF(Pair, number, result)
+#define OF_EACH(number, result) OF_PAIR(number, pair(result_of(number, a[0], b[0]), result_of(number, a[1], b[1])))
+#define LABELS(number, result) &&from_memory_##number, &&first_##number, &&second_##number, &&both_##number,
+
 /*
  * Each operation jumps to the next one itself: a processor foresees that better than the one jump of a switch. Returns
  * where each is written out, by its number; without instructions it does nothing else.
@@ -53,50 +72,18 @@ static double result_of(int64_t op, double a, double b) {
 __attribute__((optimize("no-crossjumping"))) /* gcc would merge these jumps again */
 #endif
 static const Operation *run_from(const Instruction *i) {
-#define LABELS(number, result) &&from_memory_##number, &&first_##number, &&second_##number, &&both_##number,
     static const Operation OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
     double last = 0.0;
     if (!i) return OPERATIONS;
     goto *i->op;
-#define OPERATION(label, one, other, result) \
-    label : {                                \
-        const double a = one, b = other;     \
-        (void)b;                             \
-        last = result;                       \
-        *i->to = last;                       \
-        i++;                                 \
-        goto *i->op;                         \
-    }
-#define OPERATIONS_OF(number, result)                       \
-    OPERATION(from_memory_##number, *i->a, *i->b, result)   \
-    OPERATION(first_##number, last, *i->b, result)          \
-    OPERATION(second_##number, *i->a, last, result)         \
-    OPERATION(both_##number, last, last, result)
-    EACH_OPERATION(OPERATIONS_OF)
+    EACH_OPERATION(OF_NUMBER)
 end:
     return OPERATIONS;
 }
 
 static Operation operation_of(int64_t number) { return run_from(0)[number]; }
 
-#define PAIR_OPERATION(label, one, other, result) \
-    label : {                                     \
-        const Pair a = one, b = other;            \
-        (void)b;                                  \
-        last = result;                            \
-        *(Pair *)i->to = last;                    \
-        i++;                                      \
-        goto *i->op;                              \
-    }
-#define FORMS_OF_PAIRS(number, result)                                                     \
-    PAIR_OPERATION(from_memory_##number, *(const Pair *)i->a, *(const Pair *)i->b, result) \
-    PAIR_OPERATION(first_##number, last, *(const Pair *)i->b, result)                      \
-    PAIR_OPERATION(second_##number, *(const Pair *)i->a, last, result)                     \
-    PAIR_OPERATION(both_##number, last, last, result)
-#define EACH_BY_ITSELF(number, result)                                                          \
-    FORMS_OF_PAIRS(number, pair(result_of(number, a[0], b[0]), result_of(number, a[1], b[1])))
-
-/* The same of pairs. */
+/* The same of pairs; a compiler that hoists would compute before each jump what some operations begin with. */
 #if !defined(__clang__)
 __attribute__((optimize("no-crossjumping", "no-code-hoisting")))
 #endif
@@ -105,8 +92,8 @@ static const Operation *run_pairs_from(const Instruction *i) {
     Pair last = pair(0.0, 0.0);
     if (!i) return OPERATIONS;
     goto *i->op;
-    OF_PAIRS(FORMS_OF_PAIRS)
-    OF_NUMBERS(EACH_BY_ITSELF)
+    OF_PAIRS(OF_PAIR)
+    OF_NUMBERS(OF_EACH)
 end:
     return OPERATIONS;
 }
